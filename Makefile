@@ -1,0 +1,75 @@
+# Everything a developer runs. PYTHON=python3.12 picks the interpreter, VENV=folder the environment's place,
+# UV= (empty) installs with pip even where uv is found.
+
+PYTHON ?= python3
+VENV ?= .venv
+UV ?= $(shell command -v uv 2>/dev/null)
+CONFIG ?= configs/planning/composite_wu6.yaml
+WORKERS ?= auto
+PYTEST_ARGS ?=
+
+# A PYTHONPATH that another tool set (ROS does) would hide missing packages and load foreign pytest plugins.
+unexport PYTHONPATH PYTHONHOME
+
+# The version is in the stamp's name, so that another Python makes another environment. Where $(PYTHON) belongs to
+# an environment, perhaps the very one to be replaced, the interpreter under it is meant.
+PYTHON_FOUND := $(shell $(PYTHON) -c 'import platform, sys; \
+    print(platform.python_version() + " " + getattr(sys, "_base_executable", sys.executable))' 2>/dev/null)
+PYTHON_VERSION := $(firstword $(PYTHON_FOUND))
+PYTHON_PATH := $(wordlist 2,99,$(PYTHON_FOUND))
+STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
+VENV_PYTHON := $(VENV)/bin/python
+PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
+
+.PHONY: help venv demo test check-slow lint constraints clean
+.DEFAULT_GOAL := help
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+venv: $(STAMP)  ## make the environment, or bring it up to date
+
+demo: $(STAMP)  ## run one scenario (CONFIG=...)
+	$(VENV)/bin/jffsr run $(CONFIG)
+
+test: $(STAMP)  ## run the tests (WORKERS=2, PYTEST_ARGS='-k name')
+	$(PYTEST) $(PYTEST_ARGS)
+
+check-slow: $(STAMP)  ## run the heavier checks
+	$(PYTEST) -m slow $(PYTEST_ARGS)
+
+lint: $(STAMP)  ## check style and format
+	$(VENV_PYTHON) -m ruff check .
+	$(VENV_PYTHON) -m ruff format --check .
+
+# The list must not name a registry: whoever installs uses their own.
+constraints:  ## choose the pinned versions anew (needs uv)
+	@test -n "$(UV)" || { echo "make constraints needs uv on PATH (pip install uv)." >&2; exit 1; }
+	"$(UV)" pip compile --quiet --universal --upgrade --extra test --python-version 3.11 --no-header --no-annotate \
+	    --no-emit-index-url --no-emit-find-links --output-file constraints.txt pyproject.toml
+	@! grep -nE '://|^-| @ ' constraints.txt || { echo "constraints.txt names a registry or a path." >&2; exit 1; }
+
+clean:  ## remove the environment, caches and build products (never runs/)
+	@if [ -f "$(VENV)/pyvenv.cfg" ]; then rm -rf "$(VENV)"; fi
+	rm -rf build dist *.egg-info .pytest_cache .ruff_cache
+	find jffsr tests experiments -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+
+# An environment is always made whole, so that nothing of the last one stays behind; a folder that is not one is
+# left alone.
+$(STAMP): pyproject.toml constraints.txt
+	@case "$(PYTHON_VERSION)" in 3.11.*|3.12.*|3.13.*) ;; *) \
+	    echo "jffsr needs Python 3.11, 3.12 or 3.13, but $(PYTHON) is $(or $(PYTHON_VERSION),missing or broken): name another one, for example make $(or $(MAKECMDGOALS),venv) PYTHON=python3.12" >&2; \
+	    exit 1 ;; esac
+	@if [ -f "$(VENV)/pyvenv.cfg" ]; then rm -rf "$(VENV)"; fi
+	@if [ -e "$(VENV)" ] && ! rmdir "$(VENV)" 2>/dev/null; then \
+	    echo "$(VENV) exists and is not a Python environment: remove it or name another place with VENV=." >&2; exit 1; fi
+	@echo "Installing jffsr for Python $(PYTHON_VERSION) into $(VENV) (this can take a minute or two)"
+	@set -e; \
+	if [ -n "$(UV)" ]; then \
+	    "$(UV)" venv --quiet --python "$(PYTHON_PATH)" "$(VENV)"; \
+	    "$(UV)" pip install --quiet --python "$(VENV_PYTHON)" -e '.[test]' -c constraints.txt; \
+	else \
+	    "$(PYTHON_PATH)" -m venv "$(VENV)"; \
+	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check -e '.[test]' -c constraints.txt; \
+	fi
+	@touch $@
