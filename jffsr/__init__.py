@@ -1,0 +1,52 @@
+"""jffsr: motion planning for free-floating space robots in JAX.
+
+The public names, listed by hand. They are resolved on first use (PEP 562), so that importing the package
+costs nothing and changes no setting of JAX.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "InputError": "jffsr.errors",
+    "Robot": "jffsr.robots.robot",
+    "State": "jffsr.robots.state",
+    "load_robot": "jffsr.robots.loading",
+    "list_robots": "jffsr.robots.loading",
+    "Kinematics": "jffsr.dynamics.kinematics",
+    "kinematics": "jffsr.dynamics.kinematics",
+    "system_com": "jffsr.dynamics.kinematics",
+    "end_effector_pose": "jffsr.dynamics.kinematics",
+    "jacobians": "jffsr.dynamics.kinematics",
+    "inertia_blocks": "jffsr.dynamics.momentum",
+    "generalized_inertia": "jffsr.dynamics.momentum",
+    "momentum": "jffsr.dynamics.momentum",
+    "base_twist": "jffsr.dynamics.momentum",
+    "generalized_jacobian": "jffsr.dynamics.momentum",
+    "kinetic_energy": "jffsr.dynamics.momentum",
+    "SinePolynomial": "jffsr.trajectories.sine_polynomial",
+    "Motion": "jffsr.rollouts.motion",
+    "rollout": "jffsr.rollouts.rollout",
+    "reference_rollout": "jffsr.rollouts.reference",
+    "CompositeIndex": "jffsr.objectives.composite",
+    "minimize": "jffsr.optimizers.minimize",
+    "Problem": "jffsr.planning.problem",
+    "Plan": "jffsr.planning.plan",
+    "plan": "jffsr.study.planning",
+}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'jffsr' has no attribute '{name}'")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,1 @@
+"""Kinematics, inertia blocks, momentum and the generalized Jacobian of a free-floating tree."""

@@ -1,0 +1,1 @@
+"""Robots as pytrees: descriptions, the checks at loading, and the catalogue."""

@@ -1,0 +1,166 @@
+"""The YAML form of a robot, typed: what a catalogue file may say."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from jffsr.robots.description import (
+    FIXED,
+    EndEffectorDescription,
+    JointDescription,
+    LinkDescription,
+    RobotDescription,
+)
+
+Number = Annotated[float, Field(strict=False, allow_inf_nan=True)]
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class InertiaModel(_Model):
+    """Elements of the inertia tensor about the centre of mass, link axes, kg m^2."""
+
+    xx: Number
+    yy: Number
+    zz: Number
+    xy: Number = 0.0
+    xz: Number = 0.0
+    yz: Number = 0.0
+
+    def matrix(self) -> np.ndarray:
+        """The tensor as a (3, 3) array."""
+        return np.array(
+            [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
+        )
+
+
+class LinkModel(_Model):
+    """A rigid link."""
+
+    name: Name
+    mass: Number
+    com: Triple = [0.0, 0.0, 0.0]
+    inertia: InertiaModel
+
+
+class LimitsModel(_Model):
+    """Joint limits; each in rad or m, or in degrees under the key that ends in _deg."""
+
+    position: Pair | None = None
+    position_deg: Pair | None = None
+    rate: Number | None = None
+    rate_deg: Number | None = None
+    acceleration: Number | None = None
+    acceleration_deg: Number | None = None
+    torque: Number | None = None
+
+
+class JointModel(_Model):
+    """A joint between two links."""
+
+    name: Name
+    type: Literal["revolute", "prismatic", "fixed"]
+    parent: Name
+    child: Name
+    position: Triple = [0.0, 0.0, 0.0]
+    rpy_deg: Triple = [0.0, 0.0, 0.0]
+    axis: Triple | None = None
+    limits: LimitsModel = LimitsModel()
+
+
+class EndEffectorModel(_Model):
+    """A tool frame fixed on a link."""
+
+    name: Name
+    link: Name
+    position: Triple = [0.0, 0.0, 0.0]
+    rpy_deg: Triple = [0.0, 0.0, 0.0]
+
+
+class RobotModel(_Model):
+    """A robot file."""
+
+    name: Name
+    aliases: list[Name] = []
+    description: str = ""
+    source: str = ""
+    license: str = ""
+    notes: str = ""
+    base: LinkModel
+    links: Annotated[list[LinkModel], Field(max_length=1000)] = []
+    joints: Annotated[list[JointModel], Field(max_length=1000)]
+    end_effectors: Annotated[list[EndEffectorModel], Field(max_length=1000)] = []
+
+    def describe(self, origin: str) -> RobotDescription:
+        """The description that the builder checks; `origin` is the file's name in messages."""
+        return RobotDescription(
+            name=self.name,
+            origin=origin,
+            links=tuple(_link(link) for link in (self.base, *self.links)),
+            joints=tuple(_joint(joint) for joint in self.joints),
+            end_effectors=tuple(
+                EndEffectorDescription(t.name, t.link, np.array(t.position), rpy_deg_to_matrix(t.rpy_deg))
+                for t in self.end_effectors
+            ),
+            aliases=tuple(self.aliases),
+            description=self.description,
+            source=self.source,
+            license=self.license,
+            notes=self.notes,
+        )
+
+
+def rpy_deg_to_matrix(rpy_deg: list[float]) -> np.ndarray:
+    """R = Rz(yaw) Ry(pitch) Rx(roll) of three angles in degrees, exact at multiples of 90 degrees."""
+    rotation = np.eye(3)
+    for axis, angle in enumerate(rpy_deg):
+        c, s = _exact_cosine(angle), _exact_cosine(angle - 90)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        turn[i, i], turn[i, j], turn[j, i], turn[j, j] = c, -s, s, c
+        rotation = turn @ rotation
+    return rotation
+
+
+def _exact_cosine(degrees: float) -> float:
+    # cos(pi/2) is 6e-17 in floating point, which would tilt every axis that a file states as parallel.
+    if np.isfinite(degrees) and degrees % 90 == 0:
+        return (1.0, 0.0, -1.0, 0.0)[int(degrees // 90) % 4]
+    return float(np.cos(np.deg2rad(degrees))) if np.isfinite(degrees) else float("nan")
+
+
+def _link(link: LinkModel) -> LinkDescription:
+    return LinkDescription(link.name, link.mass, np.array(link.com, dtype=float), link.inertia.matrix())
+
+
+def _joint(joint: JointModel) -> JointDescription:
+    limits = joint.limits
+    low, high = _either(limits.position, limits.position_deg, [-np.inf, np.inf])
+    axis = joint.axis if joint.axis is not None else [0.0, 0.0, 1.0 if joint.type == FIXED else 0.0]
+    return JointDescription(
+        name=joint.name,
+        type=joint.type,
+        parent=joint.parent,
+        child=joint.child,
+        position=np.array(joint.position, dtype=float),
+        rotation=rpy_deg_to_matrix(joint.rpy_deg),
+        axis=np.array(axis, dtype=float),
+        position_limit=(float(low), float(high)),
+        velocity_limit=float(_either(limits.rate, limits.rate_deg, np.inf)),
+        acceleration_limit=float(_either(limits.acceleration, limits.acceleration_deg, np.inf)),
+        torque_limit=float(limits.torque if limits.torque is not None else np.inf),
+    )
+
+
+def _either(plain, degrees, default):
+    if plain is not None:
+        return plain
+    return np.deg2rad(degrees) if degrees is not None else default

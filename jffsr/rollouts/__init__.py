@@ -1,0 +1,1 @@
+"""Base motion along a joint trajectory under conservation of momentum."""

@@ -1,0 +1,218 @@
+"""What the base's attitude needs of the joints, for a whole time grid at once.
+
+Resolved in the base frame, the locked inertia I_B(q) about the system centre of mass and the angular
+momentum h_B(q, qd) that the joints carry with the base held do not depend on the attitude:
+w_B = I_B^-1 (R' L - h_B). So they are evaluated for every grid point in one go, outside the integration.
+
+Layout: a vector is a tuple of its three components and a matrix a tuple of rows; each component is an array
+over (bodies, time), so that every operation is a long contiguous loop that the compiler can vectorise. Small
+matrices batched the other way round go through one library call each on the CPU. Only the product of
+rotations along the tree is a loop over joints; all else treats the bodies as one more batch axis. The
+barriers keep the compiler from computing a producer again for each of its consumers. The readable
+kinematics in `dynamics` is the test of this module.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jffsr.robots.robot import Robot
+from jffsr.types import Array
+
+Components = tuple[Array, Array, Array]
+Rows = tuple[Components, Components, Components]
+Symmetric = tuple[Array, Array, Array, Array, Array, Array]
+"""Elements xx, yy, zz, xy, xz, yz of a symmetric matrix."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class JointTerms:
+    """Base-frame terms on a grid of G points; every component has shape (G,).
+
+    inverse_inertia, 1/(kg m^2), of the locked inertia about the system centre of mass; joint_rate, rad/s,
+    I_B^-1 h_B, the base rate that cancels the joints' momentum; com, m, and com_velocity, m/s, of the system
+    centre of mass relative to the base.
+    """
+
+    inverse_inertia: Symmetric
+    joint_rate: Components
+    com: Components
+    com_velocity: Components
+
+    def base_rate(self, angular_momentum_B: Components) -> Components:
+        """Angular velocity of the base in B, rad/s, under an angular momentum resolved in B."""
+        return subtract(symmetric_times(self.inverse_inertia, angular_momentum_B), self.joint_rate)
+
+
+def add(a: Components, b: Components) -> Components:
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def subtract(a: Components, b: Components) -> Components:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(factor: Array, a: Components) -> Components:
+    """factor a."""
+    return (factor * a[0], factor * a[1], factor * a[2])
+
+
+def dot(a: Components, b: Components) -> Array:
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Components, b: Components) -> Components:
+    """a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def rows_times(m: Rows, v: Components) -> Components:
+    """M v."""
+    return (dot(m[0], v), dot(m[1], v), dot(m[2], v))
+
+
+def rows_product(a: Rows, b: Rows) -> Rows:
+    """A B."""
+    columns = tuple(zip(*b, strict=True))
+    return tuple(tuple(dot(row, column) for column in columns) for row in a)
+
+
+def symmetric_times(s: Symmetric, v: Components) -> Components:
+    """S v."""
+    xx, yy, zz, xy, xz, yz = s
+    return rows_times(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), v)
+
+
+def symmetric_inverse(s: Symmetric) -> Symmetric:
+    """S^-1 by cofactors."""
+    xx, yy, zz, xy, xz, yz = s
+    cofactors = (
+        yy * zz - yz * yz,
+        xx * zz - xz * xz,
+        xx * yy - xy * xy,
+        xz * yz - xy * zz,
+        xy * yz - xz * yy,
+        xy * xz - xx * yz,
+    )
+    inverse = 1 / (xx * cofactors[0] + xy * cofactors[3] + xz * cofactors[4])
+    return tuple(inverse * c for c in cofactors)
+
+
+def point_inertia(r: Components) -> Symmetric:
+    """|r|^2 1 - r r'."""
+    x, y, z = r
+    return (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
+
+
+def joint_terms(robot: Robot, joint_position: Array, joint_velocity: Array) -> JointTerms:
+    """Terms of a grid of joint positions and rates, (G, n) each."""
+    topology = robot.topology
+    revolute = topology.is_revolute[:, None]
+    q, qd = jnp.asarray(joint_position).T, jnp.asarray(joint_velocity).T
+    mass = jnp.asarray(robot.mass)
+    total = jnp.sum(mass)
+
+    rotation, parent_rotation = _rotations(robot, jnp.where(revolute, q, 0.0))
+    joint_axis = jnp.einsum("nij,nj->ni", jnp.asarray(robot.joint_rotation), jnp.asarray(robot.joint_axis))
+    axis = rows_times(parent_rotation, _constants(joint_axis))
+    turn_rate = scale(jnp.where(revolute, qd, 0.0), axis)
+    arm = rows_times(parent_rotation, _constants(robot.joint_position))
+    if not np.all(revolute):
+        arm = add(arm, scale(jnp.where(revolute, 0.0, q), axis))
+    omega, parent_omega = _along_tree(topology.parents, turn_rate)
+    origin, _ = _along_tree(topology.parents, arm)
+    velocity_step = cross(parent_omega, arm)
+    if not np.all(revolute):
+        velocity_step = add(velocity_step, scale(jnp.where(revolute, 0.0, qd), axis))
+    velocity, _ = _along_tree(topology.parents, velocity_step)
+
+    lever = rows_times(rotation, _constants(robot.link_com))
+    com = add(origin, lever)
+    link_mass = mass[1:, None]
+    linear = scale(link_mass, add(velocity, cross(omega, lever)))
+    own = _turned(rotation, jnp.asarray(robot.inertia)[1:])
+    spin = add(symmetric_times(own, omega), cross(com, linear))
+    about_base = tuple(o + link_mass * p for o, p in zip(own, point_inertia(com), strict=True))
+    com, linear, spin, about_base = jax.lax.optimization_barrier((com, linear, spin, about_base))
+
+    system_com = tuple(jnp.sum(link_mass * c, axis=0) / total for c in com)
+    momentum = tuple(jnp.sum(p, axis=0) for p in linear)
+    angular = subtract(tuple(jnp.sum(h, axis=0) for h in spin), cross(system_com, momentum))
+    base = jnp.asarray(robot.inertia)[0]
+    base = (base[0, 0], base[1, 1], base[2, 2], base[0, 1], base[0, 2], base[1, 2])
+    locked = tuple(
+        own + jnp.sum(part, axis=0) - total * shift
+        for own, part, shift in zip(base, about_base, point_inertia(system_com), strict=True)
+    )
+    inverse = symmetric_inverse(locked)
+    terms = JointTerms(
+        inverse_inertia=inverse,
+        joint_rate=symmetric_times(inverse, angular),
+        com=system_com,
+        com_velocity=scale(1 / total, momentum),
+    )
+    return jax.lax.optimization_barrier(terms)
+
+
+def _constants(values: Array) -> Components:
+    """Per-body constants (n, 3) as components of shape (n, 1)."""
+    values = jnp.asarray(values)
+    return (values[:, 0, None], values[:, 1, None], values[:, 2, None])
+
+
+def _rotations(robot: Robot, angle: Array) -> tuple[Rows, Rows]:
+    """Rotation of every moving body, and of the body that its joint hangs from, into the base frame."""
+    placed, axis = jnp.asarray(robot.joint_rotation), jnp.asarray(robot.joint_axis)
+    outer = axis[:, :, None] * axis[:, None, :]
+    x, y, z = axis.T
+    zero = jnp.zeros_like(x)
+    skewed = jnp.stack([jnp.stack(r, -1) for r in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], -2)
+    # Rodrigues: placed (a a' + (1 - a a') cos + [a]x sin), the constant factors multiplied once.
+    steady, even, odd = placed @ outer, placed @ (jnp.eye(3) - outer), placed @ skewed
+    cosine, sine = jax.lax.optimization_barrier((jnp.cos(angle), jnp.sin(angle)))
+    local = tuple(
+        tuple(
+            steady[:, r, k, None] + even[:, r, k, None] * cosine + odd[:, r, k, None] * sine for k in range(3)
+        )
+        for r in range(3)
+    )
+    local = jax.lax.optimization_barrier(local)
+    one, zero = jnp.ones_like(angle[0]), jnp.zeros_like(angle[0])
+    eye = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+    bodies = []
+    for i, parent in enumerate(robot.topology.parents):
+        own = jax.tree.map(lambda x, i=i: x[i], local)
+        turned = own if parent == 0 else rows_product(bodies[parent - 1], own)
+        bodies.append(jax.lax.optimization_barrier(turned))
+    hung_from = [eye if parent == 0 else bodies[parent - 1] for parent in robot.topology.parents]
+    return jax.lax.optimization_barrier((_stacked(bodies), _stacked(hung_from)))
+
+
+def _stacked(items: list):
+    return jax.tree.map(lambda *x: jnp.stack(x), *items)
+
+
+def _along_tree(parents: tuple[int, ...], steps: Components) -> tuple[Components, Components]:
+    """Sums of the joints' steps (n, G) from the base to each body, and to the body each hangs from."""
+    sums: list[Components] = []
+    zero = tuple(jnp.zeros_like(x[0]) for x in steps)
+    for i, parent in enumerate(parents):
+        own = tuple(x[i] for x in steps)
+        sums.append(own if parent == 0 else add(sums[parent - 1], own))
+    hung_from = [zero if parent == 0 else sums[parent - 1] for parent in parents]
+    return jax.lax.optimization_barrier((_stacked(sums), _stacked(hung_from)))
+
+
+def _turned(rotation: Rows, inertia: Array) -> Symmetric:
+    """Elements of R I R' for constant inertias (n, 3, 3)."""
+    constant = tuple(tuple(inertia[:, r, k, None] for k in range(3)) for r in range(3))
+    half = jax.lax.optimization_barrier(rows_product(rotation, constant))
+    return tuple(dot(half[r], rotation[k]) for r, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))

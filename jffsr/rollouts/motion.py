@@ -1,0 +1,54 @@
+"""What a rollout returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from jffsr.trajectories.interface import Trajectory
+from jffsr.types import Array, Scalar
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class JointGrid:
+    """Joint motion at the 2N + 1 grid points and midpoints that a Runge-Kutta step needs.
+
+    time (2N + 1,), s; joint_position, joint_velocity, joint_acceleration (2N + 1, n).
+    """
+
+    time: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Motion:
+    """A motion of the whole robot on N + 1 samples.
+
+    time (N + 1,), s; base_position (N + 1, 3), m, and base_quaternion (N + 1, 4), B to I; base_twist
+    (N + 1, 6), [linear; angular] in I; joint_position, joint_velocity, joint_acceleration (N + 1, n);
+    momentum (6,), P and L about the system centre of mass; joint_grid, the same joint motion on the finer
+    grid of 2N + 1 points, from which peaks are read.
+    """
+
+    time: Array
+    base_position: Array
+    base_quaternion: Array
+    base_twist: Array
+    joint_position: Array
+    joint_velocity: Array
+    joint_acceleration: Array
+    momentum: Array
+    joint_grid: JointGrid
+
+
+def sample_joints(trajectory: Trajectory, duration: Scalar, num_steps: int) -> JointGrid:
+    """The trajectory on the 2 num_steps + 1 points of the grid and its midpoints."""
+    time = jnp.linspace(0.0, 1.0, 2 * num_steps + 1) * duration
+    position, velocity, acceleration = jax.vmap(trajectory)(time)
+    return JointGrid(time, position, velocity, acceleration)

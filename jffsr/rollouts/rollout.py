@@ -1,0 +1,144 @@
+"""Base motion along a prescribed joint trajectory under zero or given momentum."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+
+from jffsr.errors import InputError
+from jffsr.robots.robot import Robot
+from jffsr.robots.state import State
+from jffsr.rollouts.joint_terms import (
+    Components,
+    JointTerms,
+    Rows,
+    add,
+    cross,
+    dot,
+    joint_terms,
+    rows_times,
+    subtract,
+)
+from jffsr.rollouts.motion import JointGrid, Motion, sample_joints
+from jffsr.trajectories.interface import Trajectory
+from jffsr.types import Array, Scalar, Twist
+
+
+def rollout(
+    robot: Robot,
+    trajectory: Trajectory,
+    initial_state: State,
+    duration: Scalar | float | None = None,
+    num_steps: int = 200,
+    momentum: Twist | None = None,
+) -> Motion:
+    """Motion of the robot while its joints follow the trajectory and no external force acts.
+
+    The attitude is integrated by classical Runge-Kutta of order 4 with `num_steps` equal steps (static);
+    the base position follows from the straight line of the system centre of mass. `momentum` (6,) is P,
+    N s, then L about the system centre of mass, N m s, in I; None means zero. `duration`, s, defaults to the
+    trajectory's own. Of the initial state only the base pose is read: the joints are the trajectory's.
+    """
+    grid = sample_joints(trajectory, check_duration(trajectory, duration), check_steps(num_steps))
+    return rollout_grid(robot, grid, initial_state, momentum)
+
+
+def check_duration(trajectory: Trajectory, duration: Scalar | float | None) -> Scalar | float:
+    """The duration given, else the trajectory's own; InputError if there is neither."""
+    duration = getattr(trajectory, "duration", None) if duration is None else duration
+    if duration is None:
+        raise InputError("the trajectory has no duration of its own: pass duration=, in seconds")
+    return duration
+
+
+def check_steps(num_steps: int) -> int:
+    """The number of steps, if it is a positive whole number."""
+    if not isinstance(num_steps, int) or isinstance(num_steps, bool) or num_steps < 1:
+        raise InputError(f"num_steps is {num_steps!r}; a positive whole number is expected")
+    return num_steps
+
+
+def rollout_grid(robot: Robot, grid: JointGrid, initial_state: State, momentum: Twist | None = None) -> Motion:
+    """The same for joint motion already sampled on 2N + 1 points."""
+    terms = joint_terms(robot, grid.joint_position, grid.joint_velocity)
+    momentum = jnp.zeros(6) if momentum is None else jnp.asarray(momentum)
+    initial = jnp.asarray(initial_state.base_quaternion)
+    components = _integrate_attitude(terms, grid.time[2] - grid.time[0], initial, momentum[3:])
+
+    time = grid.time[::2]
+    rotation = _rotation_rows(components)
+    samples = jax.tree.map(lambda x: x[::2], terms)
+    drift = tuple(momentum[:3] / jnp.sum(jnp.asarray(robot.mass)))
+    offset = rows_times(rotation, samples.com)
+    start = jnp.asarray(initial_state.base_position)
+    position = tuple(
+        start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3)
+    )
+    omega_B = samples.base_rate(_unturn(rotation, tuple(momentum[3:])))
+    swing = rows_times(rotation, add(cross(omega_B, samples.com), samples.com_velocity))
+    velocity = subtract(drift, swing)
+    return Motion(
+        time=time,
+        base_position=jnp.stack(position, axis=-1),
+        base_quaternion=jnp.stack(components, axis=-1),
+        base_twist=jnp.stack([*velocity, *rows_times(rotation, omega_B)], axis=-1),
+        joint_position=grid.joint_position[::2],
+        joint_velocity=grid.joint_velocity[::2],
+        joint_acceleration=grid.joint_acceleration[::2],
+        momentum=momentum,
+        joint_grid=grid,
+    )
+
+
+def _rotation_rows(q: tuple[Array, Array, Array, Array]) -> Rows:
+    w, x, y, z = q
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+
+
+def _unturn(rotation: Rows, v: Components) -> Components:
+    return tuple(dot(column, v) for column in zip(*rotation, strict=True))
+
+
+def _integrate_attitude(
+    terms: JointTerms, step: Scalar, initial: Array, angular_momentum: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Base quaternions, four components (N + 1,), by classical Runge-Kutta.
+
+    Each step is brought back to unit length, which leaves the order at 4.
+    """
+    momentum = tuple(angular_momentum)
+
+    def rate(stage: JointTerms, q):
+        w, x, y, z = q
+        ox, oy, oz = stage.base_rate(_unturn(_rotation_rows(q), momentum))
+        return (
+            0.5 * (-x * ox - y * oy - z * oz),
+            0.5 * (w * ox + y * oz - z * oy),
+            0.5 * (w * oy + z * ox - x * oz),
+            0.5 * (w * oz + x * oy - y * ox),
+        )
+
+    def moved(q, k, by):
+        return tuple(a + by * b for a, b in zip(q, k, strict=True))
+
+    def advance(q, stages):
+        first, middle, last = stages
+        k1 = rate(first, q)
+        k2 = rate(middle, moved(q, k1, step / 2))
+        k3 = rate(middle, moved(q, k2, step / 2))
+        k4 = rate(last, moved(q, k3, step))
+        slope = tuple(a + 2 * b + 2 * c + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True))
+        q = moved(q, slope, step / 6)
+        length = jnp.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        q = tuple(a / length for a in q)
+        return q, q
+
+    parts = (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+    stages = tuple(jax.tree.map(lambda x, part=part: x[part], terms) for part in parts)
+    start = tuple(initial)
+    _, later = jax.lax.scan(advance, start, stages)
+    return tuple(jnp.concatenate([a[None], b]) for a, b in zip(start, later, strict=True))

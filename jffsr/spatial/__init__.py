@@ -1,0 +1,1 @@
+"""Rotations, inertias, and norms and roots whose gradients stay finite."""

@@ -1,0 +1,30 @@
+"""What a joint trajectory is, and what a planner needs of one."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from jffsr.types import Array, Scalar, Vector
+
+
+class Trajectory(Protocol):
+    """Any callable of a scalar time, s, that gives joint position, rate and acceleration, (n,) each."""
+
+    def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]: ...
+
+
+@runtime_checkable
+class PlannedTrajectory(Protocol):
+    """A trajectory with boundary conditions that hold exactly and free numbers that a planner may choose.
+
+    `duration` is a scalar, s. `free_bounds` gives lower and upper bounds (k,) of the free numbers, and
+    `with_free` a trajectory of the same boundary conditions with those numbers (k,).
+    """
+
+    duration: Array
+
+    def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]: ...
+
+    def free_bounds(self) -> tuple[Vector, Vector]: ...
+
+    def with_free(self, free: Vector) -> PlannedTrajectory: ...
