@@ -26,7 +26,8 @@ def complaint(error: ValidationError, model: type[BaseModel], sources: Sources) 
     problems.sort(key=lambda problem: problem[0])
     _, key, entry = problems[0]
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return InputError(f"{sources.where('.'.join(key))}: {_sentence(entry, key, model, sources.mark(key))}{more}")
+    sentence = _sentence(entry, key, model, sources.mark(key))
+    return InputError(f"{sources.where('.'.join(key))}: {sentence}{more}")
 
 
 def _sentence(entry: dict[str, Any], key: Key, model: type[BaseModel], mark: Mark | None) -> str:
@@ -54,13 +55,18 @@ def _found(value: Any, mark: Mark | None) -> str:
         return "nothing" if written == "" else "null"
     if isinstance(value, bool):
         plain = "true" if value else "false"
-        return plain if written is None or written.lower() == plain else f"{written} (which YAML reads as {plain})"
+        as_read = (
+            "" if written is None or written.lower() == plain else f"{written} (which YAML reads as {plain})"
+        )
+        return as_read or plain
     if isinstance(value, str):
         return f"'{value}'" if len(value) <= 60 and value.isprintable() else repr(value[:60])
     if isinstance(value, int | float):
         return (written if written is not None else repr(value))[:60]
     if isinstance(value, list | tuple):
-        return f"a list of {len(value)}" if value else "an empty list"
+        if len(value) <= 8 and all(isinstance(item, int | float) for item in value):
+            return f"[{', '.join(str(item)[:20] for item in value)}]"
+        return f"a list of {len(value)}"
     return "a mapping"
 
 
@@ -68,12 +74,11 @@ def _advice(key: Key, model: type[BaseModel]) -> str:
     section, name = _section(model, key[:-1]), key[-1]
     if section is None:
         return ""
-    matches = nearest(name, section.model_fields)
+    # The right name in the wrong section is likelier than a similar name in this one.
+    elsewhere = [dotted for dotted in _all_keys(model) if dotted.rpartition(".")[2] == name]
+    matches = elsewhere if len(elsewhere) == 1 else nearest(name, section.model_fields)
     if matches:
         return f"; did you mean '{matches[0]}'?"
-    elsewhere = [dotted for dotted in _all_keys(model) if dotted.rpartition(".")[2] == name]
-    if len(elsewhere) == 1:
-        return f"; did you mean '{elsewhere[0]}'?"
     return f"; the keys here are {', '.join(section.model_fields)}"
 
 

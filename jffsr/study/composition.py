@@ -1,7 +1,7 @@
 """One plain mapping out of a file, the files that it builds on, and overrides; with the source of every key.
 
-A file's `defaults` list names files (relative to it, `.yaml` may be left out). Later entries win over earlier ones, the
-file over all of them, overrides over the file. Mappings merge, lists and values are replaced.
+A file's `defaults` list names files (relative to it, `.yaml` may be left out). Later entries win over earlier
+ones, the file over all of them, overrides over the file. Mappings merge, lists and values are replaced.
 """
 
 from __future__ import annotations
@@ -43,12 +43,14 @@ def _collect(path: Path, above: list[Path], documents: list[Document]) -> None:
     if document.value is None:
         raise InputError(f"{source}: the file is empty, a mapping of keys is expected")
     if not isinstance(document.value, dict):
-        raise InputError(f"{document.marks[()].place}: a mapping of keys is expected, such as 'kind: planning'")
+        place = document.marks[()].place
+        raise InputError(f"{place}: a mapping of keys is expected, such as 'kind: planning'")
     chain = [*above, path]
     names = document.value.pop("defaults", None)
-    mark = document.marks.get(("defaults",))
     if names is not None and not isinstance(names, list):
-        raise InputError(f"{mark.place}: defaults: found {mark.text!r}, a list of files is expected")
+        mark = document.marks[("defaults",)]
+        found = "a mapping" if mark.text is None else repr(mark.text[:60])
+        raise InputError(f"{mark.place}: defaults: found {found}, a list of files is expected")
     for i, name in enumerate(names or []):
         place = f"{document.marks[('defaults', str(i))].place}: defaults"
         included = _included(path, name, place)
@@ -76,7 +78,7 @@ def _included(path: Path, name: Any, place: str) -> Path:
 
 
 def _anchor_robot(value: dict[str, Any], folder: Path) -> None:
-    """Make a robot's relative path absolute: the composed study is written elsewhere and must still find it."""
+    """Make a robot's path absolute: the composed study is written elsewhere and must still find it."""
     robot = value.get("robot")
     if isinstance(robot, str) and ("/" in robot or robot.endswith(_FILE_ENDINGS)) and "\0" not in robot:
         value["robot"] = os.path.abspath(os.path.join(folder, os.path.expanduser(robot)))
@@ -84,7 +86,7 @@ def _anchor_robot(value: dict[str, Any], folder: Path) -> None:
 
 def _checked(overrides: Sequence[str]) -> list[str]:
     if isinstance(overrides, str):
-        raise InputError(f"overrides are a list of 'key=value' texts, found the single text {overrides[:60]!r}")
+        raise InputError(f"overrides are a list of 'key=value' texts, found one text {overrides[:60]!r}")
     for text in overrides:
         if not isinstance(text, str):
             raise InputError(f"found {str(text)[:60]!r} as an override, a text 'key=value' is expected")
@@ -93,21 +95,20 @@ def _checked(overrides: Sequence[str]) -> list[str]:
 
 def _override(text: str) -> Document:
     """A document whose value is (key, value)."""
-    source = f"override '{text if len(text) <= 80 else text[:77] + '...'}'"
+    line = " ".join(text.split())
+    source = f"override '{line if len(line) <= 80 else line[:77] + '...'}'"
     dotted, equals, value = text.partition("=")
     dotted = dotted.strip()
-    if not equals or not _OVERRIDE_KEY.fullmatch(dotted):
+    if not equals or not _OVERRIDE_KEY.fullmatch(dotted) or len(dotted) > 200:
         raise InputError(f"{source}: key=value is expected, the key dotted such as optimizer.particles")
     if dotted.split(".")[0] == "defaults":
         raise InputError(f"{source}: 'defaults' is read from files only")
     key: Key = tuple(dotted.split("."))
     document = parse(value, source, key, with_lines=False)
     marks = document.marks or {key: Mark(source, None, "")}
-    payload = {"robot": document.value}
-    if key == ("robot",):
-        _anchor_robot(payload, Path.cwd())
-        return Document((dotted, payload["robot"]), marks)
-    return Document((dotted, document.value), marks)
+    payload = {dotted: document.value}
+    _anchor_robot(payload, Path.cwd())
+    return Document((dotted, payload[dotted]), marks)
 
 
 def _merge(documents: list[Document], main: int) -> dict[str, Any]:
@@ -122,10 +123,23 @@ def _merge(documents: list[Document], main: int) -> dict[str, Any]:
             if i <= main:
                 merged = OmegaConf.merge(merged, value)
             else:
+                _mark_new_sections(OmegaConf.to_container(merged), key.split("."), document.marks)
                 OmegaConf.update(merged, key, value, merge=True)
-        except (OmegaConfBaseException, TypeError, ValueError, IndexError) as error:
-            raise InputError(_clash(OmegaConf.to_container(merged), document, key)) from error
+        except (OmegaConfBaseException, TypeError, ValueError, IndexError):
+            raise InputError(_clash(OmegaConf.to_container(merged), document, key)) from None
     return OmegaConf.to_container(merged, resolve=False)
+
+
+def _mark_new_sections(merged: Any, parts: list[str], marks: dict[Key, Mark]) -> None:
+    """An override also stands for each section around its key that it makes itself."""
+    here = merged
+    for i, part in enumerate(parts[:-1]):
+        if isinstance(here, list):
+            here = here[int(part)] if part.isdecimal() and int(part) < len(here) else None
+        else:
+            here = here.get(part) if isinstance(here, dict) else None
+        if not isinstance(here, dict | list):
+            marks.setdefault(tuple(parts[: i + 1]), marks[tuple(parts)])
 
 
 def _clash(merged: dict[str, Any], document: Document, dotted: str) -> str:
@@ -144,8 +158,9 @@ def _clash(merged: dict[str, Any], document: Document, dotted: str) -> str:
     found = _different(here, value, key)
     if found is None:
         return f"{document.marks[key].place}: {dotted}: this value cannot be set"
-    words = ("a list", "a mapping") if isinstance(found[1], list) else ("a mapping", "a list")
-    return f"{document.marks[found[0]].place}: {'.'.join(found[0])}: found {words[0]}, where {words[1]} was given before"
+    new, old = ("a list", "a mapping") if isinstance(found[1], list) else ("a mapping", "a list")
+    place = f"{document.marks[found[0]].place}: {'.'.join(found[0])}"
+    return f"{place}: found {new}, where {old} was given before"
 
 
 def _different(old: Any, new: Any, key: Key) -> tuple[Key, Any] | None:

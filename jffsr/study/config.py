@@ -19,9 +19,10 @@ KINDS = {"planning": PlanningConfig}
 
 
 def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] = ()) -> PlanningConfig:
-    """The configuration of a study: a path or a name under `configs/`, and `dotted.key=value` overrides in order.
+    """The configuration of a study: a path or a name under `configs/`, and `dotted.key=value` overrides.
 
-    Raises InputError: one sentence with the file and line (or the override), the key, what was found, what is expected.
+    Raises InputError: one sentence with the file and line (or the override), the key, what was found, and what
+    is expected.
     """
     path = find_config(path_or_name)
     values, sources = compose(path, overrides)
@@ -53,13 +54,16 @@ class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data) -> bool:
         return True
 
+    def represent_dict(self, data) -> yaml.Node:
+        return self.represent_mapping("tag:yaml.org,2002:map", data, flow_style=False)
+
     def represent_list(self, data) -> yaml.Node:
         flat = not any(isinstance(item, dict) for item in data)
         return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flat)
 
 
 _Dumper.add_representer(list, _Dumper.represent_list)
-_Dumper.add_representer(dict, lambda self, data: self.represent_mapping("tag:yaml.org,2002:map", data, flow_style=False))
+_Dumper.add_representer(dict, _Dumper.represent_dict)
 _Dumper.add_implicit_resolver(
     "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+\Z"), list("-+.0123456789")
 )

@@ -19,7 +19,7 @@ def shown(path: Path) -> str:
 
 
 def config_roots() -> list[Path]:
-    """The `configs` folders that are searched: the current folder's, then the repository's, where they exist."""
+    """The `configs` folders that are searched: the current folder's, then the repository's."""
     candidates = [Path("configs"), Path(__file__).resolve().parents[2] / "configs"]
     roots: dict[Path, Path] = {}
     for root in candidates:
@@ -35,7 +35,7 @@ def find_config(name: str | os.PathLike[str]) -> Path:
     """
     text = os.fspath(name)
     if not isinstance(text, str) or not text.strip() or "\0" in text or len(text) > 4000:
-        raise InputError(f"found {text[:60]!r} as a configuration, a path or a name under configs/ is expected")
+        raise InputError(f"found {text[:60]!r}, a configuration's path or name under configs/ is expected")
     for candidate in with_suffixes(Path(text)):
         if _is_there(candidate):
             return candidate
@@ -49,16 +49,19 @@ def find_config(name: str | os.PathLike[str]) -> Path:
         if len(matches) == 1:
             return matches[0]
         if matches:
-            raise InputError(f"'{text}' is the name of several configurations, give one of {listed(map(shown, matches))}")
+            paths = listed(map(shown, matches))
+            raise InputError(f"{text!r} is the name of several configurations, give one of {paths}")
         known += files
-    if Path(text).is_dir():
+    if os.path.isdir(text):
         raise InputError(f"{text}: this is a folder, a YAML file is expected")
     stems = [path.stem for path in known]
     close = nearest(Path(text).stem, stems, 3)
     advice = f"; did you mean {listed(repr(stem) for stem in close)}?" if close else ""
     if not close and known:
         advice = f"; under configs/ there are {', '.join(stems[:10])}{', ...' if len(stems) > 10 else ''}"
-    raise InputError(f"'{text}' is neither a file nor the name of a configuration under configs/{advice}")
+    raise InputError(
+        f"{text[:200]!r} is neither a file nor the name of a configuration under configs/{advice}"
+    )
 
 
 def with_suffixes(path: Path) -> list[Path]:
@@ -69,7 +72,5 @@ def with_suffixes(path: Path) -> list[Path]:
 
 
 def _is_there(path: Path) -> bool:
-    try:
-        return path.exists() and not path.is_dir()
-    except OSError:  # a name longer than the file system takes
-        return False
+    # os.path and not Path, which raises for a name longer than the file system takes.
+    return os.path.exists(path) and not os.path.isdir(path)

@@ -18,7 +18,7 @@ NAME = r"[A-Za-z0-9_.-]{1,100}"
 
 
 class PlanningConfig(Section):
-    """One planning study. Plain values, validated; equal configurations compare equal wherever they were written."""
+    """One planning study: plain values, validated; equal ones compare equal wherever they were written."""
 
     kind: Annotated[Literal["planning"], choice("planning")]
     name: Annotated[str, text(NAME, "a name of at most 100 letters, digits, '_', '.' and '-'")]
@@ -42,11 +42,12 @@ class PlanningConfig(Section):
             key = "objective.goal_attitude.enabled"
             raise conflict("found true, but no 'task.goal_attitude' is given", key)
         if not self.enabled_terms:
-            raise conflict("no term counts (an excursion only under a limit), at least one is expected", "objective")
+            sentence = "no term counts (an excursion only under a limit), at least one is expected"
+            raise conflict(sentence, "objective")
         return self
 
     def term_enabled(self, name: str) -> bool:
-        """Whether a built-in term counts, its null resolved; the excursion only counts under a limit to it."""
+        """Whether a built-in term counts, its null resolved; the excursion counts only under a limit."""
         enabled = getattr(self.objective, name).enabled
         if name == "attitude_change" and enabled is None:
             return self.task.goal_attitude is None
@@ -62,11 +63,11 @@ class PlanningConfig(Section):
         return (*filter(self.term_enabled, TERMS), *(term.label for term in self.objective.terms))
 
     def where(self, key: str) -> str:
-        """Place and key for a message, `configs/planning/x.yaml:12: task.goal_deg`; a default's: its section's line."""
+        """Place and key for a message: `configs/planning/x.yaml:12: task.goal_deg`; a default's: its section's."""
         return self._sources.where(key)
 
     def per_joint(self, quantity: str, num_joints: int) -> tuple | None:
-        """One of limits' `position` ((low, high) each), `rate`, `acceleration` for each joint, rad or m (s, s^2).
+        """The limit `position` ((low, high) each), `rate` or `acceleration` of each joint; rad or m, s.
 
         None when not given. Raises InputError when a list is given whose length is not the number of joints.
         """

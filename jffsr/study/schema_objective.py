@@ -114,6 +114,7 @@ class Objective(Section):
         taken = set(TERMS)
         for i, term in enumerate(self.terms):
             if term.label in taken:
-                raise conflict(f"a second term is named '{term.label}', give each its own 'name'", f"terms.{i}")
+                sentence = f"a second term is named '{term.label}', give each its own 'name'"
+                raise conflict(sentence, f"terms.{i}")
             taken.add(term.label)
         return self

@@ -12,6 +12,9 @@ from jffsr.study.values import choice, conflict, flag, number, sequence, whole
 
 Positive = Annotated[float, number(gt=0)]
 Flag = Annotated[bool, flag()]
+# Above 1.781 (e to Euler's constant) a particle drawn by QPSO wanders off instead of settling.
+Coefficient = Annotated[float, number(gt=0, lt=1.781)]
+Contraction = Annotated[tuple[Coefficient, ...], sequence("a pair of numbers in (0, 1.781)", 2, 2)]
 
 
 class Trajectory(Section):
@@ -34,9 +37,7 @@ class Optimizer(Section):
     particles: Annotated[int, whole(2, 100_000)] = 50
     evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # qpso: the whole budget
     swarm_evaluations: Annotated[int, whole(1, 10**9)] = 200  # hybrid: budget of the swarm phase
-    contraction: Annotated[
-        tuple[Annotated[float, number(gt=0, lt=1.781)], ...], sequence("a pair of numbers in (0, 1.781)", 2, 2)
-    ] = (1.0, 0.5)
+    contraction: Contraction = (1.0, 0.5)  # contraction-expansion coefficient: from, to
     starts: Annotated[int, whole(1, 10_000)] = 4  # gradient: starts; hybrid: best particles refined
     gradient_iterations: Annotated[int, whole(0, 10**6)] = 60
     method: Annotated[Literal["lbfgs", "adam"], choice("lbfgs", "adam")] = "lbfgs"
@@ -50,10 +51,13 @@ class Optimizer(Section):
         for kind, budget in (("hybrid", "swarm_evaluations"), ("qpso", "evaluations")):
             value = getattr(self, budget)
             if self.kind == kind and value < self.particles:
-                sentence = f"found {value}, at least one evaluation for each of the {self.particles} particles is expected"
+                sentence = (
+                    f"found {value}, at least one for each of the {self.particles} particles is expected"
+                )
                 raise conflict(sentence, budget)
         if self.kind == "hybrid" and self.starts > self.particles:
-            raise conflict(f"found {self.starts}, at most the number of particles ({self.particles}) is expected", "starts")
+            sentence = f"found {self.starts}, at most the number of particles ({self.particles}) is expected"
+            raise conflict(sentence, "starts")
         return self
 
 

@@ -35,7 +35,7 @@ Quaternion = Annotated[
 
 def _ordered_pair(value: Any) -> Any:
     if not _is_list(value) or len(value) != 2:
-        raise expected("a pair [low, high]")
+        raise expected("a pair [low, high] for each joint")
     return value
 
 
@@ -47,7 +47,7 @@ def _increasing(value: tuple[float, float]) -> tuple[float, float]:
 
 Pair = Annotated[tuple[Number, Number], BeforeValidator(_ordered_pair), AfterValidator(_increasing)]
 Range = either(
-    Annotated[float, number(gt=0, instead=" (x stands for [-x, x]) or a list with one pair [low, high] per joint")],
+    Annotated[float, number(gt=0, instead=" (x for [-x, x]) or a list of one pair [low, high] per joint")],
     Annotated[tuple[Pair, ...], sequence(f"a list of 1 to {MAX_JOINTS} pairs [low, high]", 1, MAX_JOINTS)],
     _is_list,
 )

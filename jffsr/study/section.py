@@ -13,8 +13,8 @@ from jffsr.study.values import conflict
 class Section(BaseModel):
     """A frozen group of keys; an unknown key is an error.
 
-    `units` names the quantities that may be given as `x` (rad or m) or as `x_deg` (degrees), never both; null counts
-    as not given, so that a file can take back what another file gave.
+    `units` names the quantities that may be given as `x` (rad or m) or as `x_deg` (degrees), never both; null
+    counts as not given, so that a file can take back what another file gave.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -36,7 +36,8 @@ class Section(BaseModel):
             plain, degrees = quantity, f"{quantity}_deg"
             given = [key for key in (degrees, plain) if getattr(self, key) is not None]
             if len(given) == 2:
-                raise conflict(f"both '{degrees}' and '{plain}' are given, keep one (or set the other to null)", plain)
+                sentence = f"both '{degrees}' and '{plain}' are given, keep one (or set the other to null)"
+                raise conflict(sentence, plain)
             if not given and quantity in required:
                 raise conflict(f"missing, '{degrees}' (or '{plain}', in rad or m) is required", degrees)
 

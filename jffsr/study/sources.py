@@ -9,7 +9,7 @@ from jffsr.study.yaml_lines import Key, Mark
 
 @dataclass(frozen=True)
 class Sources:
-    """The marks of every layer, later layers winning; the study's own file is layer `main`, overrides follow it.
+    """The marks of every layer, later ones winning; the study's own file is layer `main`, overrides follow.
 
     Two sources always compare equal, because where a value was written is no part of a configuration's value.
     """

@@ -1,7 +1,7 @@
 """The kinds of value that a configuration holds, each with the words that say what is expected.
 
-Each function gives a pydantic validator to annotate a field with. Numbers are finite; true/false and quoted numbers are
-not numbers; a number without a fraction (2e4) is a whole number.
+Each function gives a pydantic validator to annotate a field with. Numbers are finite; true/false and quoted
+numbers are not numbers; a number without a fraction (2e4) is a whole number.
 """
 
 from __future__ import annotations
@@ -81,10 +81,13 @@ def text(pattern: str, phrase: str) -> PlainValidator:
 
 def choice(*names: str) -> PlainValidator:
     """One of a few names."""
+    phrase = listed(f"'{name}'" for name in names)
 
     def check(value: Any) -> str:
-        if not isinstance(value, str) or value not in names:
-            raise expected(listed([f"'{n}'" for n in names]), hint(value, names) if isinstance(value, str) else "")
+        if not isinstance(value, str):
+            raise expected(phrase)
+        if value not in names:
+            raise expected(phrase, hint(value, names))
         return value
 
     return PlainValidator(check)
@@ -102,7 +105,7 @@ def sequence(phrase: str, low: int, high: int) -> BeforeValidator:
 
 
 def either(one: Any, many: Any, is_many: Callable[[Any], bool]) -> Any:
-    """The type of a key that takes two forms, told apart by `is_many` so that an error speaks of the form used."""
+    """The type of a key of two forms, told apart by `is_many` so that an error speaks of the form used."""
     first, second = UNION_SIGN + "one", UNION_SIGN + "many"
     return Annotated[
         Annotated[one, Tag(first)] | Annotated[many, Tag(second)],

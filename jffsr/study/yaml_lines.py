@@ -1,8 +1,8 @@
 """YAML text to plain values, with the line of every key, for text that nobody has vouched for.
 
-Only plain data is built (as yaml.safe_load does): no tags, no objects, no merge keys, no `${...}`. Depth and number of
-values are bounded while composing, aliases counted as often as they are used, so that no small file grows into a large
-one. Numbers are read as people write them: `1e-3` is a number, `12:30`, `010` and dates are text.
+Only plain data is built (as yaml.safe_load does): no tags, no objects, no merge keys, no `${...}`. Depth and
+number of values are bounded while composing, aliases counted as often as they are used, so that no small file
+grows into a large one. Numbers are read as people write them: `1e-3` is one; `12:30`, `010` and dates are text.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from jffsr.errors import InputError
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 30
 MAX_VALUES = 20_000
+MAX_KEY = 60
 
 Key = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Mark:
-    """Where a value was written: `source` (a file or an override), its line in a file, and its text if a scalar."""
+    """Where a value was written: a file or an override, the line in a file, and its text if a scalar."""
 
     source: str
     line: int | None
@@ -55,6 +56,7 @@ _FLOAT = re.compile(
 _BOOL = re.compile(r"(?:yes|Yes|YES|no|No|NO|true|True|TRUE|false|False|FALSE|on|On|ON|off|Off|OFF)\Z")
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
 _TAG = "tag:yaml.org,2002:"
+_PLAIN_TAGS = {_TAG + name for name in ("bool", "int", "float", "null", "str", "seq", "map")}
 
 
 class _Loader(yaml.SafeLoader):
@@ -94,7 +96,7 @@ class _Refused(Exception):
 
 
 def read_text(path: Path, shown: str) -> str:
-    """The UTF-8 text of a regular file of at most MAX_BYTES; `shown` is its name in messages. Raises InputError."""
+    """The UTF-8 text of a regular file of at most MAX_BYTES, called `shown` in messages; raises InputError."""
     try:
         # Opened first, and without waiting, so that a pipe or a device is refused and never read.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
@@ -116,7 +118,8 @@ def read_text(path: Path, shown: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{shown}:{line}: the file is not UTF-8 text (byte 0x{data[error.start]:02x})") from None
+        byte = f"0x{data[error.start]:02x}"
+        raise InputError(f"{shown}:{line}: the file is not UTF-8 text (byte {byte})") from None
 
 
 def parse(text: str, source: str, prefix: Key = (), with_lines: bool = True) -> Document:
@@ -137,13 +140,15 @@ def parse(text: str, source: str, prefix: Key = (), with_lines: bool = True) -> 
     except _Refused as error:
         line, what = error.line, error.what
     except yaml.reader.ReaderError as error:
-        line, what = text.count("\n", 0, error.position) + 1, f"character {error.character!r} is not allowed in YAML"
+        line = text.count("\n", 0, error.position) + 1
+        what = f"the character U+{ord(text[error.position]):04X} is not allowed in YAML"
     except yaml.composer.ComposerError as error:
         line = _line_of(error)
         one = "expected a single document" in (error.context or "")
         what = "a second document begins here, one is expected" if one else f"not valid YAML: {error.problem}"
     except yaml.MarkedYAMLError as error:
-        line, what = _line_of(error), f"not valid YAML: {' '.join((error.problem or error.context or '').split())}"
+        line, problem = _line_of(error), error.problem or error.context or ""
+        what = f"not valid YAML: {' '.join(problem.split())[:200]}"
         if r"'\t'" in what:
             what += " (indent with spaces, not tabs)"
     raise InputError(f"{mark(line).place}: {what}") from None
@@ -155,7 +160,7 @@ def _line_of(error: yaml.MarkedYAMLError) -> int:
 
 
 class _Builder:
-    """Turns composed nodes into plain values, noting marks, an alias built anew (and counted) wherever it is used."""
+    """Turns composed nodes into plain values and marks; an alias is built, and counted, wherever it is used."""
 
     def __init__(self, marks: dict[Key, Mark], mark: Callable[..., Mark]) -> None:
         self.marks, self.mark, self.count = marks, mark, 0
@@ -167,9 +172,9 @@ class _Builder:
             raise _Refused(line, f"more than {MAX_VALUES} values")
         if len(key) > MAX_DEPTH:
             raise _Refused(line, f"nested more than {MAX_DEPTH} levels deep")
-        plain = node.tag in {_TAG + name for name in ("bool", "int", "float", "null", "str", "seq", "map")}
-        if not plain:
-            raise _Refused(line, f"the tag {node.tag.replace(_TAG, '!!')!r} is not allowed, plain values only")
+        if node.tag not in _PLAIN_TAGS:
+            tag = node.tag.replace(_TAG, "!!")[:60]
+            raise _Refused(line, f"the tag {tag!r} is not allowed, only plain values are")
         if isinstance(node, yaml.ScalarNode):
             self.marks[key] = self.mark(line, node.value)
             return _scalar(node, line)
@@ -184,13 +189,16 @@ class _Builder:
         for name_node, item in node.value:
             line = name_node.start_mark.line + 1
             if name_node.tag == _TAG + "merge":
-                raise _Refused(line, "merge keys '<<' are not allowed; use a 'defaults' list to build on another file")
+                raise _Refused(line, "merge keys '<<' are not read, a 'defaults' list builds on another file")
             name = name_node.value
             if name_node.tag != _TAG + "str" or not isinstance(name_node, yaml.ScalarNode):
-                shown = repr(name) if isinstance(name_node, yaml.ScalarNode) else "a list or mapping"
+                shown = repr(name[:60]) if isinstance(name_node, yaml.ScalarNode) else "a list or mapping"
                 raise _Refused(line, f"found {shown} as a key, a key is text")
+            if not name.isprintable() or not 0 < len(name) <= MAX_KEY:
+                raise _Refused(line, f"found {name[:MAX_KEY]!r} as a key, a key is at most {MAX_KEY} letters")
             if name in result:
-                raise _Refused(line, f"key '{_dotted((*key, name))}' is given twice (first at line {first[name]})")
+                dotted = ".".join((*key, name))
+                raise _Refused(line, f"key '{dotted}' is given twice (first at line {first[name]})")
             first[name] = line
             result[name] = self.build(item, (*key, name), line)
         return result
@@ -200,9 +208,12 @@ def _scalar(node: yaml.ScalarNode, line: int) -> Any:
     text, kind = node.value, node.tag.removeprefix(_TAG)
     if kind == "str":
         if "${" in text or text == "???":
-            raise _Refused(line, f"found {text[:60]!r}, but '${{...}}' and '???' have no meaning here; write the value")
+            found = repr(text[:60])
+            raise _Refused(
+                line, f"found {found}, but '${{...}}' and '???' mean nothing here, write the value"
+            )
         return text
-    # An explicit tag such as `!!int fast` may sit on any text, so that each pattern is asked again.
+    # An explicit tag such as `!!int fast` may sit on any text, so the pattern is asked again.
     pattern = {"bool": _BOOL, "int": _INT, "float": _FLOAT, "null": _NULL}.get(kind)
     if pattern is None or not pattern.match(text):
         raise _Refused(line, f"found {text[:60]!r}, which is no {kind}")
@@ -215,7 +226,3 @@ def _scalar(node: yaml.ScalarNode, line: int) -> Any:
             raise _Refused(line, f"found a number of {len(text)} digits, at most 400 are read")
         return int(text)
     return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
-
-
-def _dotted(key: Key) -> str:
-    return ".".join(key)
