@@ -31,6 +31,7 @@ def compose(path: Path, overrides: Sequence[str]) -> tuple[dict[str, Any], Sourc
     # A name belongs to one file: a study that builds on another is not that other study.
     for document in documents[:-1]:
         document.value.pop("name", None)
+        document.marks.pop(("name",), None)
     main = len(documents) - 1
     documents += [_override(text) for text in _checked(overrides)]
     return _merge(documents, main), Sources(tuple(document.marks for document in documents), main)

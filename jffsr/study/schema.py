@@ -14,7 +14,7 @@ from jffsr.study.section import Section
 from jffsr.study.sources import Sources
 from jffsr.study.values import choice, conflict, text, whole
 
-NAME = r"[A-Za-z0-9_.-]{1,100}"
+NAME = r"(?!\.+\Z)[A-Za-z0-9_.-]{1,100}"  # also the name of a folder, so not . or ..
 
 
 class PlanningConfig(Section):
@@ -63,7 +63,7 @@ class PlanningConfig(Section):
         return (*filter(self.term_enabled, TERMS), *(term.label for term in self.objective.terms))
 
     def where(self, key: str) -> str:
-        """Place and key for a message: `configs/planning/x.yaml:12: task.goal_deg`; a default's: its section's."""
+        """Place and key for a message: `configs/x.yaml:12: task.goal_deg`; of a default, its section's."""
         return self._sources.where(key)
 
     def per_joint(self, quantity: str, num_joints: int) -> tuple | None:

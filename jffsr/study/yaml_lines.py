@@ -2,7 +2,7 @@
 
 Only plain data is built (as yaml.safe_load does): no tags, no objects, no merge keys, no `${...}`. Depth and
 number of values are bounded while composing, aliases counted as often as they are used, so that no small file
-grows into a large one. Numbers are read as people write them: `1e-3` is one; `12:30`, `010` and dates are text.
+grows into a large one. Numbers are read as people write them: `1e-3` is one; `12:30`, `010`, dates are text.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class _Refused(Exception):
 
 
 def read_text(path: Path, shown: str) -> str:
-    """The UTF-8 text of a regular file of at most MAX_BYTES, called `shown` in messages; raises InputError."""
+    """The UTF-8 text of a regular file of at most MAX_BYTES, `shown` in messages; raises InputError."""
     try:
         # Opened first, and without waiting, so that a pipe or a device is refused and never read.
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
@@ -160,7 +160,7 @@ def _line_of(error: yaml.MarkedYAMLError) -> int:
 
 
 class _Builder:
-    """Turns composed nodes into plain values and marks; an alias is built, and counted, wherever it is used."""
+    """Turns composed nodes into plain values and marks; an alias is built and counted wherever it is used."""
 
     def __init__(self, marks: dict[Key, Mark], mark: Callable[..., Mark]) -> None:
         self.marks, self.mark, self.count = marks, mark, 0
