@@ -14,9 +14,10 @@ from typing import Any
 
 from jffsr.errors import InputError
 from jffsr.study.did_you_mean import hint
+from jffsr.study.files import read_text
 from jffsr.study.lookup import shown, with_suffixes
 from jffsr.study.sources import Sources
-from jffsr.study.yaml_lines import Document, Key, Mark, parse, read_text
+from jffsr.study.yaml_lines import Document, Key, Mark, parse
 
 MAX_FILES = 50
 MAX_LEVELS = 10

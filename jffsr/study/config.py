@@ -21,8 +21,8 @@ KINDS = {"planning": PlanningConfig}
 def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] = ()) -> PlanningConfig:
     """The configuration of a study, given as a path or a name under `configs/`, with `a.b=value` overrides.
 
-    Raises InputError: one sentence with the file and line (or the override), the key, what was found, and what
-    is expected.
+    Raises InputError: one sentence with the file and line (or the override), the key, what was found, and
+    what is expected.
     """
     path = find_config(path_or_name)
     values, sources = compose(path, overrides)

@@ -22,7 +22,7 @@ class PlanningConfig(Section):
 
     kind: Annotated[Literal["planning"], choice("planning")]
     name: Annotated[str, text(NAME, "a name of at most 100 letters, digits, '_', '.' and '-'")]
-    robot: Annotated[str, text(r"[^\0]{1,4000}", "a name of the catalogue or a path to a robot's file")]
+    robot: Annotated[str, text(r".{1,4000}", "a name of the catalogue or a path to a robot's file")]
     limits: Limits = Limits()
     task: Task
     trajectory: Trajectory = Trajectory()

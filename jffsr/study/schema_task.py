@@ -147,14 +147,15 @@ class Task(Section):
     base_position: Vector3 = (0.0, 0.0, 0.0)  # m
     base_quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)  # w, x, y, z
     goal_attitude: Quaternion | None = None
-    end_effector: Annotated[str, text(r"(?s).{1,200}", "the name of an end effector or null")] | None = None
+    end_effector: Annotated[str, text(r".{1,200}", "the name of an end effector or null")] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Task:
         self.check_units("start", "goal")
         if len(self.start_si) != len(self.goal_si):
-            sentence = f"{len(self.goal_si)} numbers, but '{self.key_of('start')}' has {len(self.start_si)}"
-            raise conflict(f"{sentence}, as many as joints are expected in both", self.key_of("goal"))
+            start, goal = self.key_of("start"), self.key_of("goal")
+            sentence = f"found a list of {len(self.goal_si)}, as many numbers as in '{start}'"
+            raise conflict(f"{sentence} ({len(self.start_si)}) are expected", goal)
         return self
 
     @property

@@ -69,10 +69,10 @@ def flag() -> PlainValidator:
 
 
 def text(pattern: str, phrase: str) -> PlainValidator:
-    """A str that the pattern matches as a whole."""
+    """A str of printable characters that the pattern matches as a whole."""
 
     def check(value: Any) -> str:
-        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+        if not isinstance(value, str) or not value.isprintable() or not re.fullmatch(pattern, value):
             raise expected(phrase)
         return value
 
