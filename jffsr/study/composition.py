@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from jffsr.errors import InputError
-from jffsr.study.did_you_mean import hint
-from jffsr.study.files import read_text
+from jffsr.reading.did_you_mean import hint
+from jffsr.reading.files import read_text
 from jffsr.study.lookup import shown, with_suffixes
-from jffsr.study.sources import Sources
-from jffsr.study.yaml_lines import Document, Key, Mark, parse
+from jffsr.reading.sources import Sources
+from jffsr.reading.yaml_lines import Document, Key, Mark, parse
 
 MAX_FILES = 50
 MAX_LEVELS = 10

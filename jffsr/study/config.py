@@ -10,7 +10,7 @@ import yaml
 from pydantic import ValidationError
 
 from jffsr.errors import InputError
-from jffsr.study.complaints import complaint
+from jffsr.reading.complaints import complaint
 from jffsr.study.composition import compose
 from jffsr.study.lookup import find_config
 from jffsr.study.schema import PlanningConfig

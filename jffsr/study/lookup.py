@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from jffsr.errors import InputError
-from jffsr.study.did_you_mean import listed, nearest
+from jffsr.reading.did_you_mean import listed, nearest
 
 SUFFIXES = (".yaml", ".yml")
 

@@ -6,8 +6,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from jffsr.study.section import Section
-from jffsr.study.values import choice, conflict, flag, number, sequence, text
+from jffsr.reading.section import Section
+from jffsr.reading.values import choice, conflict, flag, number, sequence, text
 
 Positive = Annotated[float, number(gt=0)]
 Flag = Annotated[bool, flag()]

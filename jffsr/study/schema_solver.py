@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
-from jffsr.study.section import Section
-from jffsr.study.values import choice, conflict, flag, number, sequence, whole
+from jffsr.reading.section import Section
+from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
 
 Positive = Annotated[float, number(gt=0)]
 Flag = Annotated[bool, flag()]

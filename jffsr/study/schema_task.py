@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BeforeValidator, model_validator
 
-from jffsr.study.section import Section
-from jffsr.study.values import conflict, either, expected, number, sequence, text
+from jffsr.reading.section import Section
+from jffsr.reading.values import conflict, either, expected, number, sequence, text
 
 MAX_JOINTS = 100
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from jffsr.study.yaml_lines import Key, Mark
+from jffsr.reading.yaml_lines import Key, Mark
 
 
 @dataclass(frozen=True)

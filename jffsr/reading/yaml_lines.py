@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 from jffsr.errors import InputError
-from jffsr.study.yaml_loader import MAX_DEPTH, MAX_VALUES, PLAIN_TAGS, TAG, Loader, Refused, scalar
+from jffsr.reading.yaml_loader import MAX_DEPTH, MAX_VALUES, PLAIN_TAGS, TAG, Loader, Refused, scalar
 
 MAX_KEY = 60
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Discriminator, PlainValidator, Tag
 from pydantic_core import PydanticCustomError
 
-from jffsr.study.did_you_mean import hint, listed
+from jffsr.reading.did_you_mean import hint, listed
 
 # Tags of a union never show in a message; complaints.py drops whatever begins with this sign.
 UNION_SIGN = "<"

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, model_serializer
 
-from jffsr.study.values import conflict
+from jffsr.reading.values import conflict
 
 
 class Section(BaseModel):

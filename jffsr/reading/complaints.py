@@ -7,10 +7,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from jffsr.errors import InputError
-from jffsr.study.did_you_mean import nearest
-from jffsr.study.sources import Sources
-from jffsr.study.values import UNION_SIGN
-from jffsr.study.yaml_lines import Key, Mark
+from jffsr.reading.did_you_mean import nearest
+from jffsr.reading.sources import Sources
+from jffsr.reading.values import UNION_SIGN
+from jffsr.reading.yaml_lines import Key, Mark
 
 
 def complaint(error: ValidationError, model: type[BaseModel], sources: Sources) -> InputError:
