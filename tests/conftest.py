@@ -1,0 +1,46 @@
+"""Fixtures that the whole suite shares: float64, the catalogue, the oracle files."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import pytest
+
+jax.config.update("jax_enable_x64", True)
+
+from motions import robot_from_record  # noqa: E402
+
+from jffsr.robots.loading import list_robots, load_robot  # noqa: E402
+from jffsr.robots.robot import Robot  # noqa: E402
+
+DATA = Path(__file__).parent / "data"
+
+
+@dataclass(frozen=True)
+class Oracle:
+    """One oracle file: its robot, built from the record in the file, and everything else as read."""
+
+    name: str
+    robot: Robot
+    data: dict
+
+
+@pytest.fixture(scope="session")
+def oracles() -> dict[str, Oracle]:
+    """Both oracle files by name."""
+    found = {}
+    for name in ("wu6", "planar2"):
+        data = json.loads((DATA / "oracle" / f"{name}.json").read_text(encoding="utf-8"))
+        found[name] = Oracle(name, robot_from_record(data["robot"]), data)
+    return found
+
+
+@pytest.fixture(scope="session")
+def robots() -> dict[str, Robot]:
+    """Every robot of the catalogue, and the tree of tests/data/robots/two_arms.yaml."""
+    found = {name: load_robot(name) for name in list_robots()}
+    found["two_arms"] = load_robot(DATA / "robots" / "two_arms.yaml")
+    return found
