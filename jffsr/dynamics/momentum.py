@@ -56,9 +56,7 @@ def _momentum_about_base(robot: Robot, kin: Kinematics, momentum: Twist) -> Twis
     return jnp.concatenate([linear, angular + jnp.cross(lever, linear)])
 
 
-def base_twist(
-    robot: Robot, kin: Kinematics, joint_velocity: Vector, momentum: Twist | None = None
-) -> Twist:
+def base_twist(robot: Robot, kin: Kinematics, joint_velocity: Vector, momentum: Twist | None = None) -> Twist:
     """Base twist (6,) in I that gives the system this momentum at these joint rates.
 
     `momentum` (6,) is P, then L about the system centre of mass; None means zero.

@@ -64,9 +64,10 @@ class CompositeIndex:
         """The published index J."""
         return _total(entry.weighted for entry in self.breakdown(robot, motion).values())
 
-    def smooth(self, robot: Robot, motion: Motion) -> Scalar:
-        """The smooth index, for gradients."""
-        return _total(term.smooth(robot, motion, self.smoothing) / term.scale for term in self.terms)
+    def smooth(self, robot: Robot, motion: Motion, looseness: Scalar | float = 1.0) -> Scalar:
+        """The smooth index, for gradients; looseness widens the rounding."""
+        smoothing = self.smoothing.loosened(looseness)
+        return _total(term.smooth(robot, motion, smoothing) / term.scale for term in self.terms)
 
 
 def _total(parts) -> Scalar:

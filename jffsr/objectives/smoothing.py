@@ -16,12 +16,20 @@ from jffsr.types import Array, Scalar
 class Smoothing:
     """Widths of the rounding; as all three tend to zero, every smooth term tends to the published one.
 
-    norm, in the unit of the error whose norm is taken; peak and overrun, relative to the limit.
+    norm, relative to the scale of the term whose norm is taken; peak and overrun, relative to the limit.
     """
 
-    norm: Array | float = 1e-4
-    peak: Array | float = 5e-3
+    norm: Array | float = 0.5
+    peak: Array | float = 2e-3
     overrun: Array | float = 2e-3
+
+    def loosened(self, looseness: Array | float) -> Smoothing:
+        """Wider rounding for the way to the valley; looseness 1 changes nothing.
+
+        A rounded norm is a parabola of curvature 1/width, a rounded overrun one of much smaller curvature:
+        the norm's width takes the square of the factor to bring the two together.
+        """
+        return Smoothing(self.norm * looseness**2, self.peak * looseness, self.overrun * looseness)
 
 
 def overrun(values: Array, limit: Array) -> Scalar:
@@ -44,6 +52,6 @@ def error_norm(error: Array) -> Scalar:
     return safe_norm(error)
 
 
-def smooth_error_norm(error: Array, smoothing: Smoothing) -> Scalar:
-    """The same, rounded off at zero."""
-    return smooth_norm(error, smoothing.norm)
+def smooth_error_norm(error: Array, scale: Array, smoothing: Smoothing) -> Scalar:
+    """The same, rounded off at zero over a width in units of the term's scale."""
+    return smooth_norm(error, smoothing.norm * scale)

@@ -73,7 +73,7 @@ class AttitudeChange:
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
         """The smooth form."""
-        return smooth_error_norm(attitude_angles(motion, self.measure)[-1], smoothing)
+        return smooth_error_norm(attitude_angles(motion, self.measure)[-1], self.scale, smoothing)
 
 
 @jax.tree_util.register_dataclass
@@ -153,7 +153,7 @@ class GoalAttitude:
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
         """The smooth form."""
-        return smooth_error_norm(self._error(motion), smoothing)
+        return smooth_error_norm(self._error(motion), self.scale, smoothing)
 
 
 @jax.tree_util.register_dataclass
@@ -189,7 +189,7 @@ class ToolPosition:
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
         """The smooth form."""
-        return smooth_error_norm(self._error(robot, motion), smoothing)
+        return smooth_error_norm(self._error(robot, motion), self.scale, smoothing)
 
 
 @jax.tree_util.register_dataclass

@@ -132,7 +132,9 @@ def run(
         if state is None:
             state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
             p = jax.device_get(state.progress)
-            history.append(_record(index, before, p.iteration, p.evaluations, p.gradient_evaluations, p.best_value))
+            history.append(
+                _record(index, before, p.iteration, p.evaluations, p.gradient_evaluations, p.best_value)
+            )
             _tell(on_chunk, index, state, history)
         while not bool(phase.stop.reached(state.progress)):
             if interrupted():
@@ -196,7 +198,11 @@ def blank_state(phases: list[Phase], index: int, problem: OptimizationProblem, k
     population = None
     for number, phase in enumerate(phases[: index + 1]):
         shape = jax.eval_shape(
-            lambda o, p, k, pop: o.init(k, p, pop), phase.optimizer, problem, jax.random.fold_in(key, number), population
+            lambda o, p, k, pop: o.init(k, p, pop),
+            phase.optimizer,
+            problem,
+            jax.random.fold_in(key, number),
+            population,
         )
         if number < index:
             population = jax.eval_shape(phase.optimizer.population, shape)

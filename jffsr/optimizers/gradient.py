@@ -1,9 +1,11 @@
 """Gradient descent from several starts at once with optax, inside a box.
 
-Every step evaluates the smooth objective and its gradient once at one trial point of each start: a trial
-that does not decrease it enough (Armijo) shortens the step, one that does asks optax for the next direction.
-So the batch never waits for the longest line search, the compiled program holds the gradient once, and the
-count of evaluations is exact. Points are judged by the true objective; a start is never made worse.
+Every step evaluates the smooth objective and its gradient once at one trial point of each start. The line
+search is that of Lewis and Overton (2013): a trial that does not decrease the objective enough bounds the step
+from above, one that still descends steeply bounds it from below, any other is accepted and asks optax for the
+next direction. So the batch never waits for the longest line search, the compiled program holds the gradient
+once, and the count of evaluations is exact. Points are judged by the true objective; a start is never made
+worse.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from jffsr.optimizers.interface import (
     Progress,
     better_of,
     finite_or_inf,
+    no_progress,
     sample_box,
 )
 from jffsr.types import Array, Scalar, Vector
@@ -29,21 +32,25 @@ LBFGS = "lbfgs"
 ADAM = "adam"
 
 _ARMIJO = 1e-4
+_CURVATURE = 0.9
 # A decrease below rounding cannot be told from none.
 _ROUNDING = 1e-13
-_SHORTEST_STEP = 1e-9
+_SHORTEST_STEP = 1e-10
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Descent:
-    """One start: point, smooth value and gradient accepted last, the search direction and step length."""
+    """One start: point, smooth value and gradient accepted last, the search direction, and the step length
+    on trial between those known to be too short and too long."""
 
     point: Array
     smooth: Array
     gradient: Array
     direction: Array
     length: Array
+    too_short: Array
+    too_long: Array
     memory: optax.OptState
     stalled: Array
     active: Array
@@ -66,12 +73,14 @@ class GradientDescent:
     """L-BFGS or Adam from `starts` points: the best of a given population, else uniform in the box.
 
     A start stops when its gradient is shorter than gradient_tolerance, or when value_tolerance times the
-    value was not gained in ten accepted steps. starts, method and memory are static.
+    value was not gained in ten accepted steps. looseness is how much rounder than the problem's own the smooth
+    objective is. starts, method and memory are static.
     """
 
     gradient_tolerance: Array | float = 1e-8
     value_tolerance: Array | float = 1e-9
     learning_rate: Array | float = 0.05
+    looseness: Array | float = 1.0
     starts: int = field(default=4, metadata={"static": True})
     method: str = field(default=LBFGS, metadata={"static": True})
     memory: int = field(default=10, metadata={"static": True})
@@ -84,7 +93,7 @@ class GradientDescent:
     def init(
         self, key: Array, problem: OptimizationProblem, population: Population | None = None
     ) -> GradientState:
-        """The starts and their gradients; one evaluation of each start."""
+        """The starts; nothing is evaluated yet: the first trial is at the start itself, a step of zero."""
         if population is None:
             positions = sample_box(key, problem, self.starts)
         else:
@@ -92,36 +101,30 @@ class GradientDescent:
             positions = population.positions[order]
         lower, upper = problem.bounds()
         points = jax.vmap(lambda x: from_box(x, lower, upper))(positions)
-        smooth, value, gradient = self._evaluate(problem, points)
-        direction, memory = jax.vmap(self._first_direction)(gradient, points)
         count = points.shape[0]
-        inside = jax.vmap(lambda z: to_box(z, lower, upper))(points)
         descent = Descent(
             point=points,
-            smooth=smooth,
-            gradient=gradient,
-            direction=direction,
-            length=jnp.ones(count) * (self.learning_rate if self.method == ADAM else 1.0),
-            memory=memory,
+            smooth=jnp.full(count, jnp.inf),
+            gradient=jnp.zeros_like(points),
+            direction=jnp.zeros_like(points),
+            length=jnp.ones(count),
+            too_short=jnp.zeros(count),
+            too_long=jnp.full(count, jnp.inf),
+            memory=jax.vmap(self._transformation().init)(points),
             stalled=jnp.zeros(count, dtype=int),
-            active=jnp.isfinite(smooth),
-            best_position=inside,
-            best_value=value,
+            active=jnp.ones(count, dtype=bool),
+            best_position=positions,
+            best_value=jnp.full(count, jnp.inf),
         )
-        best = jnp.argmin(value)
-        best_position, best_value = inside[best], value[best]
+        progress = no_progress(positions[0])
         if population is not None:
             best_position, best_value = better_of(
-                best_position, best_value, population.positions, finite_or_inf(population.values)
+                progress.best_position,
+                progress.best_value,
+                population.positions,
+                finite_or_inf(population.values),
             )
-        progress = Progress(
-            best_position=best_position,
-            best_value=best_value,
-            iteration=jnp.array(0),
-            evaluations=jnp.array(0),
-            gradient_evaluations=jnp.array(count),
-            converged=~jnp.any(descent.active),
-        )
+            progress = replace(progress, best_position=best_position, best_value=best_value)
         return GradientState(descent, progress)
 
     def _evaluate(self, problem: OptimizationProblem, points: Array) -> tuple[Array, Array, Array]:
@@ -129,7 +132,7 @@ class GradientDescent:
         lower, upper = problem.bounds()
 
         def objective(z: Vector) -> tuple[Scalar, Scalar]:
-            return problem.smooth_and_value(to_box(z, lower, upper))
+            return problem.smooth_and_value(to_box(z, lower, upper), self.looseness)
 
         (smooth, value), gradient = jax.vmap(jax.value_and_grad(objective, has_aux=True))(points)
         usable = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)
@@ -138,11 +141,6 @@ class GradientDescent:
             finite_or_inf(value),
             jnp.where(usable[:, None], gradient, 0.0),
         )
-
-    def _first_direction(self, gradient: Vector, point: Vector):
-        transformation = self._transformation()
-        update, memory = transformation.update(gradient, transformation.init(point), point)
-        return -update, memory
 
     def step(self, problem: OptimizationProblem, state: GradientState) -> GradientState:
         """One trial of every active start."""
@@ -154,9 +152,7 @@ class GradientDescent:
         advanced = jax.vmap(self._advance)(descent, trial, smooth, gradient)
         improved = descent.active & (value < descent.best_value)
         advanced = jax.tree.map(
-            lambda new, old: jnp.where(
-                descent.active.reshape((-1,) + (1,) * (new.ndim - 1)), new, old
-            ),
+            lambda new, old: jnp.where(descent.active.reshape((-1,) + (1,) * (new.ndim - 1)), new, old),
             advanced,
             descent,
         )
@@ -168,40 +164,41 @@ class GradientDescent:
         best_position, best_value = better_of(
             progress.best_position, progress.best_value, advanced.best_position, advanced.best_value
         )
-        progress = Progress(
+        progress = replace(
+            progress,
             best_position=best_position,
             best_value=best_value,
             iteration=progress.iteration + 1,
-            evaluations=progress.evaluations,
             gradient_evaluations=progress.gradient_evaluations + jnp.sum(descent.active),
             converged=~jnp.any(advanced.active),
         )
         return GradientState(advanced, progress)
 
     def _advance(self, old: Descent, trial: Vector, smooth: Scalar, gradient: Vector) -> Descent:
-        """One start after its trial: the next direction, or a shorter step along the old one."""
+        """One start after its trial: the next direction, or another step along the old one."""
+        update, memory = self._transformation().update(gradient, old.memory, trial)
+        direction = -update
         if self.method == ADAM:
-            accepted = jnp.isfinite(smooth)
+            accepted, too_short, too_long = jnp.isfinite(smooth), old.too_short, old.too_long
+            another = first = jnp.full_like(old.length, self.learning_rate)
         else:
             slope = jnp.vdot(old.gradient, old.direction)
             floor = _ROUNDING * (1 + jnp.abs(old.smooth))
-            accepted = smooth <= old.smooth + _ARMIJO * old.length * slope + floor
-        update, memory = self._transformation().update(gradient, old.memory, trial)
-        direction = -update
-        if self.method == LBFGS:
-            # Curvature pairs of negative sign can turn the direction uphill: fall back to the slope.
-            downhill = jnp.vdot(direction, gradient) < 0
-            direction = jnp.where(downhill & jnp.all(jnp.isfinite(direction)), direction, -gradient)
+            lower = smooth <= old.smooth + _ARMIJO * old.length * slope + floor
+            level = jnp.vdot(gradient, old.direction) >= _CURVATURE * slope
+            accepted = lower & level
+            too_long = jnp.where(lower, old.too_long, old.length)
+            too_short = jnp.where(lower, old.length, old.too_short)
+            another = self._another_length(old, too_short, too_long, smooth, slope)
+            # Rounding can turn a direction uphill; the slope never does.
+            downhill = (jnp.vdot(direction, gradient) < 0) & jnp.all(jnp.isfinite(direction))
+            steepest = -gradient / jnp.maximum(jnp.linalg.norm(gradient), 1e-300)
+            direction = jnp.where(downhill, direction, steepest)
+            first = jnp.ones_like(old.length)
         gained = old.smooth - smooth > self.value_tolerance * (1 + jnp.abs(old.smooth))
         stalled = jnp.where(gained, 0, old.stalled + 1)
         flat = jnp.linalg.norm(gradient) <= self.gradient_tolerance
-        if self.method == ADAM:
-            shorter, full = old.length, old.length
-        else:
-            # The minimum of the parabola through both values and the slope, kept within [0.1, 0.5].
-            bend = smooth - old.smooth - old.length * slope
-            ratio = jnp.where(jnp.isfinite(bend) & (bend > 0), -0.5 * old.length * slope / bend, 0.1)
-            shorter, full = old.length * jnp.clip(ratio, 0.1, 0.5), jnp.ones_like(old.length)
+        spent = (another < _SHORTEST_STEP) | (too_long - too_short < _SHORTEST_STEP * too_long)
 
         def chosen(new, kept):
             return jax.tree.map(lambda a, b: jnp.where(accepted, a, b), new, kept)
@@ -211,15 +208,26 @@ class GradientDescent:
             smooth=chosen(smooth, old.smooth),
             gradient=chosen(gradient, old.gradient),
             direction=chosen(direction, old.direction),
-            length=chosen(full, shorter),
+            length=chosen(first, another),
+            too_short=chosen(jnp.zeros_like(too_short), too_short),
+            too_long=chosen(jnp.full_like(too_long, jnp.inf), too_long),
             memory=chosen(memory, old.memory),
             stalled=chosen(stalled, old.stalled),
-            active=jnp.where(accepted, ~flat & (stalled < 10), shorter > _SHORTEST_STEP),
+            active=jnp.where(accepted, ~flat & (stalled < 10), ~spent),
             best_position=old.best_position,
             best_value=old.best_value,
         )
 
+    def _another_length(self, old: Descent, too_short, too_long, smooth: Scalar, slope: Scalar) -> Scalar:
+        """The next step to try: twice as long while nothing bounds it, else between the two bounds."""
+        # From a step of zero, the minimum of the parabola through both values and the slope; else halfway.
+        bend = smooth - old.smooth - old.length * slope
+        parabola = jnp.where(jnp.isfinite(bend) & (bend > 0), -0.5 * old.length**2 * slope / bend, 0.0)
+        between = jnp.where(
+            too_short > 0, (too_short + too_long) / 2, jnp.clip(parabola, 0.1 * too_long, 0.5 * too_long)
+        )
+        return jnp.where(jnp.isfinite(too_long), between, 2 * old.length)
+
     def population(self, state: GradientState) -> Population:
         """The best point of each start."""
         return Population(state.descent.best_position, state.descent.best_value)
-

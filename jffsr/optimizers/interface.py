@@ -21,14 +21,14 @@ class OptimizationProblem(Protocol):
     """A box and an objective, written for one candidate (d,).
 
     `value` is what is minimised and reported. `smooth_and_value` gives a differentiable stand-in for it
-    together with the value itself.
+    together with the value itself; a looseness above 1 makes the stand-in rounder and easier.
     """
 
     def bounds(self) -> tuple[Vector, Vector]: ...
 
     def value(self, candidate: Vector) -> Scalar: ...
 
-    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]: ...
+    def smooth_and_value(self, candidate: Vector, looseness: Scalar) -> tuple[Scalar, Scalar]: ...
 
 
 @jax.tree_util.register_dataclass
@@ -48,7 +48,7 @@ class FunctionProblem:
         """The function."""
         return self.function(candidate)
 
-    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]:
+    def smooth_and_value(self, candidate: Vector, looseness: Scalar | float = 1.0) -> tuple[Scalar, Scalar]:
         """The function twice: it is its own stand-in."""
         value = self.function(candidate)
         return value, value
@@ -69,6 +69,12 @@ class Progress:
     evaluations: Array
     gradient_evaluations: Array
     converged: Array
+
+
+def no_progress(position: Vector) -> Progress:
+    """Progress before the first evaluation; `position` only gives the best point a shape and a place."""
+    zero = jnp.zeros((), dtype=int)
+    return Progress(position, jnp.array(jnp.inf), zero, zero, zero, jnp.array(False))
 
 
 class Population(NamedTuple):

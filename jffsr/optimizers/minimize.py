@@ -31,7 +31,9 @@ def minimize(
     """
     lower, upper = (np.array(bound, dtype=float) for bound in bounds)
     if lower.ndim != 1 or lower.shape != upper.shape or lower.size == 0:
-        raise InputError(f"bounds have shapes {lower.shape} and {upper.shape}; two vectors of one length are expected")
+        raise InputError(
+            f"bounds have shapes {lower.shape} and {upper.shape}; two vectors of one length are expected"
+        )
     if not (np.all(np.isfinite(lower)) and np.all(np.isfinite(upper)) and np.all(lower <= upper)):
         raise InputError("bounds must be finite, and no lower bound above its upper bound")
     settings = settings or Settings()

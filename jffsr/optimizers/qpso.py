@@ -8,7 +8,7 @@ personal bests of the whole swarm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +19,7 @@ from jffsr.optimizers.interface import (
     Progress,
     better_of,
     finite_or_inf,
+    no_progress,
     sample_box,
 )
 from jffsr.types import Array
@@ -53,56 +54,47 @@ class QPSO:
     def init(
         self, key: Array, problem: OptimizationProblem, population: Population | None = None
     ) -> SwarmState:
-        """A swarm uniform in the box, a given population taking the first places; P evaluations."""
+        """A swarm uniform in the box, a given population taking the first places; nothing is evaluated yet."""
         key, draw = jax.random.split(key)
         position = sample_box(draw, problem, self.particles)
         if population is not None:
             given = population.positions[: self.particles]
             position = position.at[: given.shape[0]].set(given)
-        value = finite_or_inf(jax.vmap(problem.value)(position))
-        best = jnp.argmin(value)
-        progress = Progress(
-            best_position=position[best],
-            best_value=value[best],
-            iteration=jnp.zeros((), jnp.int64 if jax.config.jax_enable_x64 else jnp.int32),
-            evaluations=jnp.array(self.particles),
-            gradient_evaluations=jnp.array(0),
-            converged=jnp.array(False),
-        )
-        return SwarmState(key, position, position, value, progress)
+        progress = no_progress(position[0])
+        return SwarmState(key, position, position, jnp.full(self.particles, jnp.inf), progress)
 
     def step(self, problem: OptimizationProblem, state: SwarmState) -> SwarmState:
-        """One generation; P evaluations."""
+        """One generation: P evaluations where the swarm stands, then the move to where it goes next."""
         progress = state.progress
-        lower, upper = problem.bounds()
-        fraction = jnp.clip(progress.iteration / jnp.maximum(self.iterations, 1), 0.0, 1.0)
-        contraction = self.contraction_start + (self.contraction_end - self.contraction_start) * fraction
-
-        mix, leap = jax.random.split(jax.random.fold_in(state.key, progress.iteration))
-        shape = state.position.shape
-        phi = jax.random.uniform(mix, shape)
-        attractor = phi * state.personal_best + (1 - phi) * progress.best_position
-        mean_best = jnp.mean(state.personal_best, axis=0)
-        # A random sign times log(1/u), u uniform in (0, 1], is a Laplace variable: one draw instead of two.
-        step = contraction * jnp.abs(mean_best - state.position) * jax.random.laplace(leap, shape)
-        position = jnp.clip(attractor + step, lower, upper)
-
-        value = finite_or_inf(jax.vmap(problem.value)(position))
+        value = finite_or_inf(jax.vmap(problem.value)(state.position))
         improved = value < state.personal_value
-        personal_best = jnp.where(improved[:, None], position, state.personal_best)
+        personal_best = jnp.where(improved[:, None], state.position, state.personal_best)
         personal_value = jnp.where(improved, value, state.personal_value)
         best_position, best_value = better_of(
             progress.best_position, progress.best_value, personal_best, personal_value
         )
-        progress = Progress(
+        position = self._move(problem, state, personal_best, best_position)
+        progress = replace(
+            progress,
             best_position=best_position,
             best_value=best_value,
             iteration=progress.iteration + 1,
             evaluations=progress.evaluations + self.particles,
-            gradient_evaluations=progress.gradient_evaluations,
-            converged=progress.converged,
         )
         return SwarmState(state.key, position, personal_best, personal_value, progress)
+
+    def _move(self, problem: OptimizationProblem, state: SwarmState, personal_best, best_position) -> Array:
+        iteration = state.progress.iteration
+        fraction = jnp.clip(iteration / jnp.maximum(self.iterations, 1), 0.0, 1.0)
+        contraction = self.contraction_start + (self.contraction_end - self.contraction_start) * fraction
+        mix, leap = jax.random.split(jax.random.fold_in(state.key, iteration))
+        phi = jax.random.uniform(mix, state.position.shape)
+        attractor = phi * personal_best + (1 - phi) * best_position
+        mean_best = jnp.mean(personal_best, axis=0)
+        # A random sign times log(1/u), u uniform in (0, 1], is a Laplace variable: one draw instead of two.
+        jump = jnp.abs(mean_best - state.position) * jax.random.laplace(leap, state.position.shape)
+        lower, upper = problem.bounds()
+        return jnp.clip(attractor + contraction * jump, lower, upper)
 
     def population(self, state: SwarmState) -> Population:
         """The personal bests."""

@@ -20,7 +20,8 @@ class Settings:
     """Plain numbers that every registered optimizer is built from; each uses those it knows.
 
     evaluations: the budget of a swarm run alone; swarm_evaluations: the swarm's share in a hybrid;
-    gradient_iterations: steps of the gradient phase, each one gradient of every active start; target: stop
+    gradient_iterations and polish_iterations: steps of the gradient phase on the loosened and on the sharp index,
+    each one gradient of every active start; target: stop
     as soon as the objective is at most this.
     """
 
@@ -28,8 +29,10 @@ class Settings:
     evaluations: int = 20_000
     swarm_evaluations: int = 200
     contraction: tuple[float, float] = (1.0, 0.5)
-    starts: int = 4
+    starts: int = 2
     gradient_iterations: int = 60
+    polish_iterations: int = 30
+    looseness: float = 10.0
     method: str = LBFGS
     learning_rate: float = 0.05
     memory: int = 10
@@ -43,8 +46,10 @@ def _swarm(settings: Settings, evaluations: int) -> Phase:
             f"contraction {settings.contraction} must lie in (0, {LARGEST_CONTRACTION:.3f}): above, the swarm diverges"
         )
     if evaluations < settings.particles:
-        raise InputError(f"{evaluations} evaluations are fewer than one generation of {settings.particles} particles")
-    generations = evaluations // settings.particles - 1
+        raise InputError(
+            f"{evaluations} evaluations are fewer than one generation of {settings.particles} particles"
+        )
+    generations = evaluations // settings.particles
     optimizer = QPSO(
         iterations=float(generations),
         contraction_start=start,
@@ -54,17 +59,24 @@ def _swarm(settings: Settings, evaluations: int) -> Phase:
     return Phase("swarm", optimizer, Stop(iterations=float(generations), target=_target(settings)))
 
 
-def _descent(settings: Settings) -> Phase:
+def _descent(settings: Settings) -> list[Phase]:
+    """Down the rounded index into a valley, then down the sharp one to its floor."""
     if settings.method not in (LBFGS, ADAM):
         raise InputError(f"method '{settings.method}' is unknown; allowed are {LBFGS}, {ADAM}")
-    optimizer = GradientDescent(
-        learning_rate=settings.learning_rate,
-        starts=settings.starts,
-        method=settings.method,
-        memory=settings.memory,
-    )
-    stop = Stop(iterations=float(settings.gradient_iterations), target=_target(settings))
-    return Phase("gradient", optimizer, stop)
+    phases = []
+    for name, looseness, iterations in (
+        ("gradient", settings.looseness, settings.gradient_iterations),
+        ("polish", 1.0, settings.polish_iterations),
+    ):
+        optimizer = GradientDescent(
+            learning_rate=settings.learning_rate,
+            looseness=looseness,
+            starts=settings.starts,
+            method=settings.method,
+            memory=settings.memory,
+        )
+        phases.append(Phase(name, optimizer, Stop(iterations=float(iterations), target=_target(settings))))
+    return phases
 
 
 def _target(settings: Settings) -> float:
@@ -76,11 +88,11 @@ def _qpso(settings: Settings) -> list[Phase]:
 
 
 def _hybrid(settings: Settings) -> list[Phase]:
-    return [_swarm(settings, settings.swarm_evaluations), _descent(settings)]
+    return [_swarm(settings, settings.swarm_evaluations), *_descent(settings)]
 
 
 def _gradient(settings: Settings) -> list[Phase]:
-    return [_descent(settings)]
+    return _descent(settings)
 
 
 OPTIMIZERS: dict[str, Callable[[Settings], list[Phase]]] = {

@@ -52,10 +52,13 @@ class Problem:
         """The published index."""
         return self.objective.value(self.robot, self.motion(candidate))
 
-    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]:
+    def smooth_and_value(self, candidate: Vector, looseness: Scalar | float = 1.0) -> tuple[Scalar, Scalar]:
         """The smooth index and the published one, of the same motion."""
         motion = self.motion(candidate)
-        return self.objective.smooth(self.robot, motion), self.objective.value(self.robot, motion)
+        return (
+            self.objective.smooth(self.robot, motion, looseness),
+            self.objective.value(self.robot, motion),
+        )
 
     def terms(self, candidate: Vector) -> dict[str, TermValue]:
         """Every term of the published index by name, before and after weighting."""

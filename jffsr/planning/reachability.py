@@ -32,7 +32,9 @@ def check_duration_possible(
         return
     sentences = []
     for i in np.flatnonzero(least > duration):
-        unit, turn = ("m", goal[i] - start[i]) if _slides(robot, i) else ("deg", np.rad2deg(goal[i] - start[i]))
+        unit, turn = (
+            ("m", goal[i] - start[i]) if _slides(robot, i) else ("deg", np.rad2deg(goal[i] - start[i]))
+        )
         per = "m" if _slides(robot, i) else "rad"
         rate, acceleration = robot.limits.velocity[i], robot.limits.acceleration[i]
         alone = 2 * np.sqrt(abs(goal[i] - start[i]) / acceleration) if np.isfinite(acceleration) else 0.0

@@ -49,7 +49,9 @@ class Result:
         return self.code is ResultCode.ACCURACY_MET
 
 
-def result_code(problem: Problem, verification: Verification, converged: Array, tolerances: Tolerances) -> Array:
+def result_code(
+    problem: Problem, verification: Verification, converged: Array, tolerances: Tolerances
+) -> Array:
     """The code as an int32 array; works under vmap. `converged` is whether the search had come to its end."""
     largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in _KINDS]))
     finite = jnp.isfinite(verification.cost)
@@ -96,11 +98,15 @@ def explain(
             f"moving when its budget ended, so raise the budget"
         )
     elif code is ResultCode.NOT_VERIFIED:
-        text = "not verified: " + ", ".join(_unverified(verification, tolerances)) + "; raise rollout.num_steps"
+        text = (
+            "not verified: " + ", ".join(_unverified(verification, tolerances)) + "; raise rollout.num_steps"
+        )
     elif code is ResultCode.INTERRUPTED:
         text = "interrupted: a checkpoint was written; the same command goes on from there"
     else:
-        text = "no finite index was found: every candidate gave NaN or infinity; check the robot and the terms"
+        text = (
+            "no finite index was found: every candidate gave NaN or infinity; check the robot and the terms"
+        )
     return Result(code, text if reason != "interrupted" else f"{text} (interrupted)")
 
 
@@ -110,7 +116,11 @@ def _binding(verification: Verification) -> str:
 
 
 def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[str]:
-    for what, unit in (("attitude_difference", " rad"), ("momentum_drift", " relative"), ("boundary_error", "")):
+    for what, unit in (
+        ("attitude_difference", " rad"),
+        ("momentum_drift", " relative"),
+        ("boundary_error", ""),
+    ):
         value, allowed = float(getattr(verification, what)), getattr(tolerances, what.split("_")[0])
         if not value <= allowed:
             yield f"{what.replace('_', ' ')} of {value:.3g}{unit} (allowed {allowed:g})"

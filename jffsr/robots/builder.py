@@ -58,7 +58,9 @@ def _numbers(values: np.ndarray) -> str:
 def _check_joint(where: str, joint: JointDescription) -> None:
     body = f"{where}: joint '{joint.name}'"
     if joint.type not in (REVOLUTE, PRISMATIC, FIXED):
-        raise InputError(f"{body}: type '{joint.type}' is not supported; allowed are revolute, prismatic, fixed")
+        raise InputError(
+            f"{body}: type '{joint.type}' is not supported; allowed are revolute, prismatic, fixed"
+        )
     for what, value in (("position", joint.position), ("rotation", joint.rotation), ("axis", joint.axis)):
         if not np.all(np.isfinite(value)):
             raise InputError(f"{body}: {what} {np.asarray(value).tolist()} is not finite")
@@ -68,7 +70,9 @@ def _check_joint(where: str, joint: JointDescription) -> None:
         raise InputError(f"{body}: axis {joint.axis.tolist()} has length zero")
     low, high = joint.position_limit
     if np.isnan(low) or np.isnan(high) or not low < high:
-        raise InputError(f"{body}: position limits [{low:g}, {high:g}]; the lower must be less than the upper")
+        raise InputError(
+            f"{body}: position limits [{low:g}, {high:g}]; the lower must be less than the upper"
+        )
     for what in ("velocity_limit", "acceleration_limit", "torque_limit"):
         value = getattr(joint, what)
         if not value > 0:
@@ -117,10 +121,14 @@ def _tree_order(description: RobotDescription) -> list[JointDescription]:
         seen, name = set(), link.name
         while name != root:
             if name in seen:
-                raise InputError(f"{where}: link '{link.name}' hangs in a loop of joints that never reaches the root")
+                raise InputError(
+                    f"{where}: link '{link.name}' hangs in a loop of joints that never reaches the root"
+                )
             seen.add(name)
             if name not in parents:
-                raise InputError(f"{where}: link '{name}' is an orphan: no joint connects it to the root '{root}'")
+                raise InputError(
+                    f"{where}: link '{name}' is an orphan: no joint connects it to the root '{root}'"
+                )
             name = parents[name].parent
     placed, order, waiting = {root}, [], list(description.joints)
     while waiting:

@@ -66,7 +66,9 @@ def _catalogue() -> dict[str, RobotModel]:
 def _parse(text: str, origin: str) -> RobotModel:
     document = parse(text, origin)
     if not isinstance(document.value, dict):
-        raise InputError(f"{origin}: a mapping with the keys {', '.join(RobotModel.model_fields)} is expected")
+        raise InputError(
+            f"{origin}: a mapping with the keys {', '.join(RobotModel.model_fields)} is expected"
+        )
     try:
         return RobotModel.model_validate(document.value)
     except ValidationError as error:

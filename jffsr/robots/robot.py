@@ -41,6 +41,21 @@ class Topology:
         return mask
 
     @property
+    def chains(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
+        """The tree as unbranched chains: the body each hangs from, and its joints from there outwards."""
+        chains: list[tuple[int, list[int]]] = []
+        tips: dict[int, int] = {}
+        for joint, parent in enumerate(self.parents):
+            if parent in tips:
+                number = tips.pop(parent)
+                chains[number][1].append(joint)
+            else:
+                number = len(chains)
+                chains.append((parent, [joint]))
+            tips[joint + 1] = number
+        return tuple((parent, tuple(joints)) for parent, joints in chains)
+
+    @property
     def is_revolute(self) -> np.ndarray:
         """Boolean (n,): whether joint j is revolute; the others are prismatic."""
         return np.array([kind == REVOLUTE for kind in self.joint_types], dtype=bool)

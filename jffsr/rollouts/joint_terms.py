@@ -15,12 +15,14 @@ kinematics in `dynamics` is the test of this module.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jffsr.robots.robot import Robot
+from jffsr.robots.robot import Robot, Topology
+from jffsr.spatial.inertia import skew
 from jffsr.types import Array
 
 Components = tuple[Array, Array, Array]
@@ -120,19 +122,16 @@ def joint_terms(robot: Robot, joint_position: Array, joint_velocity: Array) -> J
     mass = jnp.asarray(robot.mass)
     total = jnp.sum(mass)
 
-    rotation, parent_rotation = _rotations(robot, jnp.where(revolute, q, 0.0))
-    joint_axis = jnp.einsum("nij,nj->ni", jnp.asarray(robot.joint_rotation), jnp.asarray(robot.joint_axis))
-    axis = rows_times(parent_rotation, _constants(joint_axis))
-    turn_rate = scale(jnp.where(revolute, qd, 0.0), axis)
-    arm = rows_times(parent_rotation, _constants(robot.joint_position))
-    if not np.all(revolute):
-        arm = add(arm, scale(jnp.where(revolute, 0.0, q), axis))
-    omega, parent_omega = _along_tree(topology.parents, turn_rate)
-    origin, _ = _along_tree(topology.parents, arm)
-    velocity_step = cross(parent_omega, arm)
-    if not np.all(revolute):
-        velocity_step = add(velocity_step, scale(jnp.where(revolute, 0.0, qd), axis))
-    velocity, _ = _along_tree(topology.parents, velocity_step)
+    local, axis, arm = _joint_frames(robot, q, revolute)
+    steps = _Step(
+        local,
+        axis,
+        arm,
+        jnp.where(revolute, qd, 0.0),
+        jnp.where(revolute, 0.0, q),
+        jnp.where(revolute, 0.0, qd),
+    )
+    rotation, origin, omega, velocity = _along_tree(topology, steps)
 
     lever = rows_times(rotation, _constants(robot.link_com))
     com = add(origin, lever)
@@ -168,47 +167,84 @@ def _constants(values: Array) -> Components:
     return (values[:, 0, None], values[:, 1, None], values[:, 2, None])
 
 
-def _rotations(robot: Robot, angle: Array) -> tuple[Rows, Rows]:
-    """Rotation of every moving body, and of the body that its joint hangs from, into the base frame."""
+class _Step(NamedTuple):
+    """What one joint adds to the body that it hangs from: every leaf has the joints as its first axis.
+
+    rotation of the joint's own turn; axis and arm in the parent body's frame, shape (n, 1); turn_rate, slide
+    and slide_rate (n, G), zero where the joint is of the other type.
+    """
+
+    rotation: Rows
+    axis: Components
+    arm: Components
+    turn_rate: Array
+    slide: Array
+    slide_rate: Array
+
+
+class _Body(NamedTuple):
+    """Pose and velocity of a body's frame, resolved in the base frame with the base held."""
+
+    rotation: Rows
+    origin: Components
+    omega: Components
+    velocity: Components
+
+
+def _joint_frames(robot: Robot, q: Array, revolute: np.ndarray) -> tuple[Rows, Components, Components]:
+    """Each joint's own turn, and its axis and anchor in the frame of the body that it hangs from."""
     placed, axis = jnp.asarray(robot.joint_rotation), jnp.asarray(robot.joint_axis)
     outer = axis[:, :, None] * axis[:, None, :]
-    x, y, z = axis.T
-    zero = jnp.zeros_like(x)
-    skewed = jnp.stack([jnp.stack(r, -1) for r in ((zero, -z, y), (z, zero, -x), (-y, x, zero))], -2)
     # Rodrigues: placed (a a' + (1 - a a') cos + [a]x sin), the constant factors multiplied once.
-    steady, even, odd = placed @ outer, placed @ (jnp.eye(3) - outer), placed @ skewed
+    steady, even, odd = placed @ outer, placed @ (jnp.eye(3) - outer), placed @ skew(axis)
+    angle = jnp.where(revolute, q, 0.0)
     cosine, sine = jax.lax.optimization_barrier((jnp.cos(angle), jnp.sin(angle)))
-    local = tuple(
+    turn = tuple(
         tuple(
             steady[:, r, k, None] + even[:, r, k, None] * cosine + odd[:, r, k, None] * sine for k in range(3)
         )
         for r in range(3)
     )
-    local = jax.lax.optimization_barrier(local)
-    one, zero = jnp.ones_like(angle[0]), jnp.zeros_like(angle[0])
-    eye = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
-    bodies = []
-    for i, parent in enumerate(robot.topology.parents):
-        own = jax.tree.map(lambda x, i=i: x[i], local)
-        turned = own if parent == 0 else rows_product(bodies[parent - 1], own)
-        bodies.append(jax.lax.optimization_barrier(turned))
-    hung_from = [eye if parent == 0 else bodies[parent - 1] for parent in robot.topology.parents]
-    return jax.lax.optimization_barrier((_stacked(bodies), _stacked(hung_from)))
+    axis_in_parent = jnp.einsum("nij,nj->ni", placed, axis)
+    return turn, _constants(axis_in_parent), _constants(robot.joint_position)
 
 
-def _stacked(items: list):
-    return jax.tree.map(lambda *x: jnp.stack(x), *items)
+def _along_tree(topology: Topology, steps: _Step) -> _Body:
+    """Bodies 1 to n, leaves (n, G): one loop over the joints of each unbranched chain of the tree."""
+    zero = jnp.zeros_like(steps.turn_rate[0])
+    one = zero + 1
+    base = _Body(
+        ((one, zero, zero), (zero, one, zero), (zero, zero, one)), (zero,) * 3, (zero,) * 3, (zero,) * 3
+    )
+    parts, order = [], []
+    for parent, joints in topology.chains:
+        start = base
+        if parent > 0:
+            place = order.index(parent - 1)
+            start = jax.tree.map(lambda *x, place=place: jnp.concatenate(x)[place], *parts)
+        first, last = joints[0], joints[-1] + 1
+        contiguous = joints == tuple(range(first, last))
+        index = slice(first, last) if contiguous else np.array(joints)
+        _, bodies = jax.lax.scan(_advance, start, jax.tree.map(lambda x, index=index: x[index], steps))
+        parts.append(bodies)
+        order.extend(joints)
+    bodies = jax.tree.map(lambda *x: jnp.concatenate(x) if len(x) > 1 else x[0], *parts)
+    if order == sorted(order):
+        return bodies
+    return jax.tree.map(lambda x: x[np.argsort(order)], bodies)
 
 
-def _along_tree(parents: tuple[int, ...], steps: Components) -> tuple[Components, Components]:
-    """Sums of the joints' steps (n, G) from the base to each body, and to the body each hangs from."""
-    sums: list[Components] = []
-    zero = tuple(jnp.zeros_like(x[0]) for x in steps)
-    for i, parent in enumerate(parents):
-        own = tuple(x[i] for x in steps)
-        sums.append(own if parent == 0 else add(sums[parent - 1], own))
-    hung_from = [zero if parent == 0 else sums[parent - 1] for parent in parents]
-    return jax.lax.optimization_barrier((_stacked(sums), _stacked(hung_from)))
+def _advance(parent: _Body, step: _Step) -> tuple[_Body, _Body]:
+    axis = rows_times(parent.rotation, step.axis)
+    arm = add(rows_times(parent.rotation, step.arm), scale(step.slide, axis))
+    swing = add(cross(parent.omega, arm), scale(step.slide_rate, axis))
+    body = _Body(
+        rotation=rows_product(parent.rotation, step.rotation),
+        origin=add(parent.origin, arm),
+        omega=add(parent.omega, scale(step.turn_rate, axis)),
+        velocity=add(parent.velocity, swing),
+    )
+    return body, body
 
 
 def _turned(rotation: Rows, inertia: Array) -> Symmetric:

@@ -54,7 +54,9 @@ def reference_rollout(
         return pose, pose
 
     joints = (grid.joint_position, grid.joint_velocity)
-    stages = tuple(tuple(x[part] for x in joints) for part in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)))
+    stages = tuple(
+        tuple(x[part] for x in joints) for part in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+    )
     initial = jnp.concatenate(
         [jnp.asarray(initial_state.base_position), jnp.asarray(initial_state.base_quaternion)]
     )

@@ -15,6 +15,7 @@ from jffsr.rollouts.joint_terms import (
     add,
     cross,
     dot,
+    symmetric_times,
     joint_terms,
     rows_times,
     subtract,
@@ -58,7 +59,9 @@ def check_steps(num_steps: int) -> int:
     return num_steps
 
 
-def rollout_grid(robot: Robot, grid: JointGrid, initial_state: State, momentum: Twist | None = None) -> Motion:
+def rollout_grid(
+    robot: Robot, grid: JointGrid, initial_state: State, momentum: Twist | None = None
+) -> Motion:
     """The same for joint motion already sampled on 2N + 1 points."""
     terms = joint_terms(robot, grid.joint_position, grid.joint_velocity)
     momentum = jnp.zeros(6) if momentum is None else jnp.asarray(momentum)
@@ -71,9 +74,7 @@ def rollout_grid(robot: Robot, grid: JointGrid, initial_state: State, momentum: 
     drift = tuple(momentum[:3] / jnp.sum(jnp.asarray(robot.mass)))
     offset = rows_times(rotation, samples.com)
     start = jnp.asarray(initial_state.base_position)
-    position = tuple(
-        start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3)
-    )
+    position = tuple(start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3))
     omega_B = samples.base_rate(_unturn(rotation, tuple(momentum[3:])))
     swing = rows_times(rotation, add(cross(omega_B, samples.com), samples.com_velocity))
     velocity = subtract(drift, swing)
@@ -112,9 +113,10 @@ def _integrate_attitude(
     """
     momentum = tuple(angular_momentum)
 
-    def rate(stage: JointTerms, q):
+    def rate(stage: Array, q):
         w, x, y, z = q
-        ox, oy, oz = stage.base_rate(_unturn(_rotation_rows(q), momentum))
+        spin = symmetric_times(tuple(stage[:6]), _unturn(_rotation_rows(q), momentum))
+        ox, oy, oz = subtract(spin, tuple(stage[6:]))
         return (
             0.5 * (-x * ox - y * oy - z * oz),
             0.5 * (w * ox + y * oz - z * oy),
@@ -137,8 +139,8 @@ def _integrate_attitude(
         q = tuple(a / length for a in q)
         return q, q
 
-    parts = (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
-    stages = tuple(jax.tree.map(lambda x, part=part: x[part], terms) for part in parts)
+    packed = jax.lax.optimization_barrier(jnp.stack([*terms.inverse_inertia, *terms.joint_rate], axis=-1))
+    stages = (packed[:-1:2], packed[1::2], packed[2::2])
     start = tuple(initial)
     _, later = jax.lax.scan(advance, start, stages)
     return tuple(jnp.concatenate([a[None], b]) for a, b in zip(start, later, strict=True))

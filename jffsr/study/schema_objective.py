@@ -88,9 +88,9 @@ class OwnTerm(Section):
 class Smoothing(Section):
     """Widths of the smooth stand-ins for norm, peak and overrun that gradients are taken of."""
 
-    norm: Positive = 1e-4
-    peak: Positive = 0.005
-    overrun: Positive = 0.002
+    norm: Positive = 0.5  # of the term's scale
+    peak: Positive = 0.002  # of the limit
+    overrun: Positive = 0.002  # of the limit
 
 
 class Objective(Section):

@@ -38,8 +38,10 @@ class Optimizer(Section):
     evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # qpso: the whole budget
     swarm_evaluations: Annotated[int, whole(1, 10**9)] = 200  # hybrid: budget of the swarm phase
     contraction: Contraction = (1.0, 0.5)  # contraction-expansion coefficient: from, to
-    starts: Annotated[int, whole(1, 10_000)] = 4  # gradient: starts; hybrid: best particles refined
-    gradient_iterations: Annotated[int, whole(0, 10**6)] = 60
+    starts: Annotated[int, whole(1, 10_000)] = 2  # gradient: starts; hybrid: best particles refined
+    gradient_iterations: Annotated[int, whole(0, 10**6)] = 60  # on the loosened index
+    polish_iterations: Annotated[int, whole(0, 10**6)] = 30  # on the sharp one
+    looseness: Annotated[float, number(ge=1, le=1000)] = 10.0  # how much rounder the loosened index is
     method: Annotated[Literal["lbfgs", "adam"], choice("lbfgs", "adam")] = "lbfgs"
     learning_rate: Positive = 0.05  # adam
     memory: Annotated[int, whole(1, 1000)] = 10  # lbfgs

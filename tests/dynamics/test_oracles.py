@@ -123,7 +123,10 @@ def test_the_catalogue_robot_is_the_oracles(oracles):
     assert topology.body_names == theirs.topology.body_names
     assert topology.end_effector_bodies == theirs.topology.end_effector_bodies
     chex.assert_trees_all_close(
-        jax.tree.leaves(ours.replace(limits=None)), jax.tree.leaves(theirs.replace(limits=None)), rtol=0, atol=1e-15
+        jax.tree.leaves(ours.replace(limits=None)),
+        jax.tree.leaves(theirs.replace(limits=None)),
+        rtol=0,
+        atol=1e-15,
     )
 
 
@@ -131,7 +134,10 @@ def test_the_catalogue_planar_arm_is_ten_times_the_oracles(oracles):
     ours, theirs = load_robot("hu_2011_planar2"), oracles["planar2"].robot
     scaled = theirs.replace(mass=10 * theirs.mass, inertia=10 * theirs.inertia)
     chex.assert_trees_all_close(
-        jax.tree.leaves(ours.replace(limits=None)), jax.tree.leaves(scaled.replace(limits=None)), rtol=1e-15, atol=1e-15
+        jax.tree.leaves(ours.replace(limits=None)),
+        jax.tree.leaves(scaled.replace(limits=None)),
+        rtol=1e-15,
+        atol=1e-15,
     )
 
 
