@@ -1,0 +1,212 @@
+"""From a typed configuration to a problem and the optimizer's settings: the checks that need the robot."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from dataclasses import replace
+
+import jax
+import numpy as np
+
+from jffsr.errors import InputError
+from jffsr.objectives.composite import CompositeIndex, composite_index
+from jffsr.objectives.smoothing import Smoothing
+from jffsr.objectives.terms import UserTerm
+from jffsr.optimizers.registry import Settings
+from jffsr.planning.problem import Problem
+from jffsr.planning.reachability import check_duration_possible
+from jffsr.planning.result import Tolerances
+from jffsr.robots.loading import load_robot
+from jffsr.robots.robot import PRISMATIC, Robot
+from jffsr.robots.state import State
+from jffsr.study.schema import PlanningConfig
+from jffsr.trajectories.sine_polynomial import SinePolynomial
+
+
+def build_problem(config: PlanningConfig) -> Problem:
+    """The planning problem; InputError with file, line and key where the robot and the task do not fit."""
+    robot = build_robot(config)
+    trajectory = _trajectory(config, robot)
+    task = config.task
+    problem = Problem(
+        robot=robot,
+        trajectory=trajectory,
+        objective=_objective(config, robot),
+        initial_state=State(
+            np.array(task.base_position), np.array(task.base_quaternion), np.array(task.start_si)
+        ),
+        momentum=np.array(task.momentum),
+        num_steps=config.rollout.num_steps,
+    )
+    _check_user_terms(config, problem)
+    return problem
+
+
+def build_robot(config: PlanningConfig) -> Robot:
+    """The robot with the limits that the study puts in place of its own."""
+    try:
+        robot = load_robot(config.robot)
+    except InputError as error:
+        raise InputError(f"{config.where('robot')}: {error}") from None
+    limits, n = robot.limits, robot.num_joints
+    position = config.per_joint("position", n)
+    rate, acceleration = config.per_joint("rate", n), config.per_joint("acceleration", n)
+    changes = {}
+    if position is not None:
+        changes["position_lower"] = np.array([low for low, _ in position])
+        changes["position_upper"] = np.array([high for _, high in position])
+    if rate is not None:
+        changes["velocity"] = np.array(rate)
+    if acceleration is not None:
+        changes["acceleration"] = np.array(acceleration)
+    return robot.replace(limits=replace(limits, **changes))
+
+
+def build_settings(config: PlanningConfig) -> tuple[str, Settings]:
+    """The registered optimizer's name and its settings."""
+    chosen = config.optimizer
+    return chosen.kind, Settings(
+        particles=chosen.particles,
+        evaluations=chosen.evaluations,
+        swarm_evaluations=chosen.swarm_evaluations,
+        contraction=chosen.contraction,
+        starts=chosen.starts,
+        gradient_iterations=chosen.gradient_iterations,
+        polish_iterations=chosen.polish_iterations,
+        looseness=chosen.looseness,
+        method=chosen.method,
+        learning_rate=chosen.learning_rate,
+        memory=chosen.memory,
+        target=chosen.target,
+    )
+
+
+def build_tolerances(config: PlanningConfig) -> Tolerances:
+    """What the verification must keep."""
+    wanted = config.verification
+    return Tolerances(
+        limit=wanted.limit_tolerance,
+        attitude=wanted.attitude_tolerance,
+        momentum=wanted.momentum_tolerance,
+    )
+
+
+def _trajectory(config: PlanningConfig, robot: Robot) -> SinePolynomial:
+    task = config.task
+    start, goal = np.array(task.start_si), np.array(task.goal_si)
+    for quantity, value in (("start", start), ("goal", goal)):
+        _check_posture(config, robot, quantity, value)
+    shortest, longest = task.duration_range
+    check_duration_possible(robot, start, goal, longest, config.where("task.duration"))
+    return SinePolynomial.between(
+        start,
+        goal,
+        robot.limits.position_lower,
+        robot.limits.position_upper,
+        longest,
+        box=config.trajectory.box,
+        duration_bounds=(shortest, longest) if task.duration_is_free else None,
+        joint_names=robot.joint_names,
+    )
+
+
+def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: np.ndarray) -> None:
+    key = config.task.key_of(quantity)
+    where = config.where(f"task.{key}")
+    if value.size != robot.num_joints:
+        raise InputError(f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints")
+    for i, name in enumerate(robot.joint_names):
+        low, high = robot.limits.position_lower[i], robot.limits.position_upper[i]
+        if not (np.isfinite(low) and np.isfinite(high)):
+            raise InputError(
+                f"{config.where('limits')}: {name} of robot '{robot.name}' has no position limits, which the "
+                f"sine-polynomial law needs; give limits.position_deg or limits.position"
+            )
+        if not low < value[i] < high:
+            slides = robot.topology.joint_types[i] == PRISMATIC
+            shown = [x if slides or not key.endswith("_deg") else np.rad2deg(x) for x in (value[i], low, high)]
+            unit = "m" if slides else ("deg" if key.endswith("_deg") else "rad")
+            place = "on a limit of" if value[i] in (low, high) else "outside"
+            raise InputError(
+                f"{where}: {name}: {shown[0]:g} {unit} lies {place} its range [{shown[1]:g}, {shown[2]:g}] {unit}; "
+                f"a value strictly inside is expected"
+            )
+
+
+def _objective(config: PlanningConfig, robot: Robot) -> CompositeIndex:
+    objective, task = config.objective, config.task
+
+    def scale(name: str, value: float) -> float | None:
+        return value if config.term_enabled(name) else None
+
+    if task.end_effector is not None and task.end_effector not in robot.end_effector_names:
+        raise InputError(
+            f"{config.where('task.end_effector')}: found '{task.end_effector}', robot '{robot.name}' has "
+            f"{', '.join(robot.end_effector_names) or 'none'}"
+        )
+    if config.term_enabled("tool_position") and not robot.end_effector_names:
+        raise InputError(
+            f"{config.where('objective.tool_position.enabled')}: found true, robot '{robot.name}' has no end effector"
+        )
+    smoothing = objective.smoothing
+    return composite_index(
+        robot,
+        joint_goal=task.goal_si,
+        initial_quaternion=task.base_quaternion,
+        goal_quaternion=task.goal_attitude,
+        excursion_limit=config.limits.base_excursion_si,
+        attitude_change=scale("attitude_change", objective.attitude_change.scale_si),
+        joint_rate=scale("joint_rate", objective.joint_rate.scale),
+        joint_acceleration=scale("joint_acceleration", objective.joint_acceleration.scale),
+        attitude_excursion=scale("attitude_excursion", objective.attitude_excursion.scale),
+        goal_attitude=scale("goal_attitude", objective.goal_attitude.scale),
+        tool_position=scale("tool_position", objective.tool_position.scale),
+        measure=objective.attitude_measure,
+        end_effector=task.end_effector,
+        smoothing=Smoothing(smoothing.norm, smoothing.peak, smoothing.overrun),
+        accuracy=objective.accuracy,
+        extra=[_user_term(config, i) for i in range(len(objective.terms))],
+    )
+
+
+def _user_term(config: PlanningConfig, index: int) -> UserTerm:
+    term = config.objective.terms[index]
+    where = config.where(f"objective.terms.{index}.call")
+    module, _, name = term.call.rpartition(".")
+    # A console script does not search the folder it is called from, where a user's own module lies.
+    folder = os.getcwd()
+    added = folder not in sys.path
+    if added:
+        sys.path.insert(0, folder)
+    try:
+        function = getattr(importlib.import_module(module), name)
+    except Exception as error:
+        raise InputError(f"{where}: '{term.call}' cannot be imported ({type(error).__name__}: {error})") from None
+    finally:
+        if added:
+            sys.path.remove(folder)
+    if not callable(function):
+        raise InputError(f"{where}: '{term.call}' is not callable; a function of (robot, motion) is expected")
+    with np.errstate(divide="ignore"):
+        scale = np.float64(1.0) / np.float64(term.weight)
+    return UserTerm(scale, function, term.label)
+
+
+def _check_user_terms(config: PlanningConfig, problem: Problem) -> None:
+    """Trace each of the user's terms once, so that its mistake is told at its line and not as a traceback."""
+    own = [term for term in problem.objective.terms if isinstance(term, UserTerm)]
+    if not own:
+        return
+    lower, _ = problem.bounds()
+    motion = jax.eval_shape(problem.motion, np.zeros(lower.shape))
+    for index, term in enumerate(own):
+        where = config.where(f"objective.terms.{index}.call")
+        try:
+            shape = jax.eval_shape(term.value, problem.robot, motion).shape
+        except Exception as error:
+            told = f"{type(error).__name__}: {error}".splitlines()[0]
+            raise InputError(f"{where}: '{term.name}' failed on (robot, motion) ({told[:200]})") from None
+        if shape != ():
+            raise InputError(f"{where}: '{term.name}' gives an array of shape {shape}; a scalar is expected")
