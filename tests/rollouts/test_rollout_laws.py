@@ -1,0 +1,125 @@
+"""What holds for every motion: two paths agree, order 4, unit quaternions, twist = derivative of pose."""
+
+from __future__ import annotations
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from motions import Quintic
+
+from jffsr.errors import InputError
+from jffsr.robots.loading import list_robots
+from jffsr.robots.state import State
+from jffsr.rollouts.reference import reference_rollout
+from jffsr.rollouts.rollout import rollout
+from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply
+from jffsr.trajectories.sine_polynomial import SinePolynomial
+
+MOMENTUM = np.array([1.0, -2.0, 0.5, 3.0, 2.0, -4.0])
+START_ATTITUDE = np.array([0.8, 0.2, -0.4, 0.4])
+# The remaining two robots are compared in test_rollout_oracles.py.
+OTHERS = sorted({*list_robots(), "two_arms"} - {"wu_2018_6dof", "hu_2011_planar2"})
+
+
+def _setting(robot):
+    rng = np.random.default_rng(11)
+    start, goal = rng.uniform(-0.6, 0.6, (2, robot.num_joints))
+    start = np.where(robot.topology.is_revolute, start, 0.2 * start)
+    state = State(np.array([0.3, -0.2, 0.1]), START_ATTITUDE, start)
+    return Quintic(start, goal, np.array(8.0)), state
+
+
+@pytest.fixture(scope="module", params=OTHERS)
+def both(request, robots):
+    """The same motion by both paths, in steps so fine that their different ways to the position do not show."""
+    robot = robots[request.param]
+    trajectory, state = _setting(robot)
+    momentum = MOMENTUM * np.sum(robot.mass) / 2000
+    return [
+        jax.jit(lambda r, t, path=path: path(r, t, state, num_steps=500, momentum=momentum))(robot, trajectory)
+        for path in (rollout, reference_rollout)
+    ]
+
+
+def test_both_paths_give_the_same_motion(both):
+    fast, plain = both
+    chex.assert_trees_all_equal_shapes(fast, plain)
+    chex.assert_tree_all_finite(fast)
+    np.testing.assert_allclose(fast.base_quaternion, plain.base_quaternion, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(fast.base_twist, plain.base_twist, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(fast.base_position, plain.base_position, rtol=0, atol=1e-11)
+
+
+def test_quaternions_have_unit_length(both):
+    for motion in both:
+        np.testing.assert_allclose(np.linalg.norm(motion.base_quaternion, axis=1), 1, rtol=0, atol=1e-12)
+
+
+def test_base_twist_is_the_derivative_of_the_base_pose(both):
+    for motion in both:
+        h = motion.time[1]
+
+        def derivative(x, h=h):
+            one, two, three = (x[3 + k : -3 + k or None] - x[3 - k : -3 - k] for k in (1, 2, 3))
+            return (45 * one - 9 * two + three) / (60 * h)
+
+        inner = slice(3, -3)
+        np.testing.assert_allclose(
+            derivative(motion.base_position), motion.base_twist[inner, :3], rtol=0, atol=1e-9
+        )
+        spin = 2 * quaternion_multiply(
+            derivative(motion.base_quaternion), quaternion_conjugate(motion.base_quaternion[inner])
+        )
+        np.testing.assert_allclose(spin[:, 0], 0, atol=1e-9)
+        np.testing.assert_allclose(spin[:, 1:], motion.base_twist[inner, 3:], rtol=0, atol=1e-9)
+
+
+def test_attitude_converges_with_order_four(robots):
+    """Twice the steps, a sixteenth of the error: the final attitude against a 40 times finer motion."""
+    robot = robots["hu_2011_planar2"]
+    trajectory = Quintic(np.array([0.5, -0.3]), np.array([-0.6, 1.0]), np.array(10.0))
+    state = State(np.zeros(3), START_ATTITUDE, np.zeros(2))
+    momentum = np.array([5.0, 0, -3, 30.0, -40.0, 60.0])
+
+    def final(path, steps):
+        motion = jax.jit(lambda t: path(robot, t, state, num_steps=steps, momentum=momentum))(trajectory)
+        return motion.base_quaternion[-1]
+
+    exact = final(rollout, 1600)
+    for path in (rollout, reference_rollout):
+        coarse, fine = (np.linalg.norm(final(path, steps) - exact) for steps in (20, 40))
+        assert fine > 1e-10, "too accurate to see an order"
+        np.testing.assert_allclose(np.log2(coarse / fine), 4.0, atol=0.1)
+
+
+def test_duration_and_steps_are_checked(robots):
+    robot = robots["hu_2011_planar2"]
+    trajectory, state = _setting(robot)
+    with pytest.raises(InputError, match=r"has no duration of its own: pass duration="):
+        rollout(robot, lambda t: (t, t, t), state)
+    for wrong in (0, -3, 2.5, True):
+        with pytest.raises(InputError, match=r"num_steps is .*; a positive whole number is expected"):
+            rollout(robot, trajectory, state, num_steps=wrong)
+
+
+def test_a_plain_callable_is_a_trajectory(robots):
+    """A user's own function of time, with the duration given, moves the robot as the package's law does."""
+    robot = robots["hu_2011_planar2"]
+    law = SinePolynomial.between([0.1, 0.2], [0.5, -0.4], [-2, -2], [2, 2], 5.0)
+    state = State(np.zeros(3), START_ATTITUDE, np.zeros(2))
+    ours = rollout(robot, law, state, num_steps=4)
+    theirs = rollout(robot, lambda t: law(t), state, duration=5.0, num_steps=4)
+    chex.assert_trees_all_close(ours, theirs, rtol=0, atol=1e-15)
+
+
+def test_none_is_zero_momentum_and_vmap_is_a_loop(robots):
+    robot = robots["hu_2011_planar2"]
+    trajectory, state = _setting(robot)
+    batch = jnp.stack([jnp.zeros(6), MOMENTUM])
+    together = jax.jit(jax.vmap(lambda m: rollout(robot, trajectory, state, num_steps=10, momentum=m)))(batch)
+    none = jax.jit(lambda: rollout(robot, trajectory, state, num_steps=10))()
+    chex.assert_trees_all_close(jax.tree.map(lambda x: x[0], together), none, rtol=0, atol=1e-14)
+    alone = jax.jit(lambda m: rollout(robot, trajectory, state, num_steps=10, momentum=m))(MOMENTUM)
+    chex.assert_trees_all_close(jax.tree.map(lambda x: x[1], together), alone, rtol=0, atol=1e-14)
