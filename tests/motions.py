@@ -62,7 +62,10 @@ def robot_from_record(record: dict) -> Robot:
             ),
             end_effectors=tuple(
                 EndEffectorDescription(
-                    tool["name"], names[tool["link"]], np.array(tool["origin_xyz"]), np.array(tool["origin_R"])
+                    tool["name"],
+                    names[tool["link"]],
+                    np.array(tool["origin_xyz"]),
+                    np.array(tool["origin_R"]),
                 )
                 for tool in record["end_effectors"]
             ),

@@ -35,7 +35,7 @@ def _cases(data: dict) -> list[dict]:
 
 
 def _inputs(cases: list[dict]) -> dict[str, np.ndarray]:
-    """Inputs stacked over the cases; the given angular momentum moved from the origin to the system's centre."""
+    """Inputs stacked over the cases; the given angular momentum is moved to the system's centre."""
     read = {key: np.array([c["inputs"][key] for c in cases]) for key in cases[0]["inputs"]}
     com = np.array([c["outputs"]["system_com"] for c in cases])
     about_com = read["given_L_origin"] - np.cross(com, read["given_P"])
@@ -123,7 +123,10 @@ def test_the_catalogue_robot_is_the_oracles(oracles):
     assert topology.body_names == theirs.topology.body_names
     assert topology.end_effector_bodies == theirs.topology.end_effector_bodies
     chex.assert_trees_all_close(
-        jax.tree.leaves(ours.replace(limits=None)), jax.tree.leaves(theirs.replace(limits=None)), rtol=0, atol=1e-15
+        jax.tree.leaves(ours.replace(limits=None)),
+        jax.tree.leaves(theirs.replace(limits=None)),
+        rtol=0,
+        atol=1e-15,
     )
 
 
@@ -131,7 +134,10 @@ def test_the_catalogue_planar_arm_is_ten_times_the_oracles(oracles):
     ours, theirs = load_robot("hu_2011_planar2"), oracles["planar2"].robot
     scaled = theirs.replace(mass=10 * theirs.mass, inertia=10 * theirs.inertia)
     chex.assert_trees_all_close(
-        jax.tree.leaves(ours.replace(limits=None)), jax.tree.leaves(scaled.replace(limits=None)), rtol=1e-15, atol=1e-15
+        jax.tree.leaves(ours.replace(limits=None)),
+        jax.tree.leaves(scaled.replace(limits=None)),
+        rtol=1e-15,
+        atol=1e-15,
     )
 
 

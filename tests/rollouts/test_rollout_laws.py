@@ -13,7 +13,7 @@ from jffsr.errors import InputError
 from jffsr.robots.loading import list_robots
 from jffsr.robots.state import State
 from jffsr.rollouts.reference import reference_rollout
-from jffsr.rollouts.rollout import rollout
+from jffsr.rollouts.rollout import check_steps, rollout
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply
 from jffsr.trajectories.sine_polynomial import SinePolynomial
 
@@ -33,12 +33,14 @@ def _setting(robot):
 
 @pytest.fixture(scope="module", params=OTHERS)
 def both(request, robots):
-    """The same motion by both paths, in steps so fine that their different ways to the position do not show."""
+    """The same motion by both paths, in steps so fine that their ways to the position do not differ."""
     robot = robots[request.param]
     trajectory, state = _setting(robot)
     momentum = MOMENTUM * np.sum(robot.mass) / 2000
     return [
-        jax.jit(lambda r, t, path=path: path(r, t, state, num_steps=500, momentum=momentum))(robot, trajectory)
+        jax.jit(lambda r, t, path=path: path(r, t, state, num_steps=500, momentum=momentum))(
+            robot, trajectory
+        )
         for path in (rollout, reference_rollout)
     ]
 
@@ -102,6 +104,7 @@ def test_duration_and_steps_are_checked(robots):
     for wrong in (0, -3, 2.5, True):
         with pytest.raises(InputError, match=r"num_steps is .*; a positive whole number is expected"):
             rollout(robot, trajectory, state, num_steps=wrong)
+    assert check_steps(np.int64(5)) == 5
 
 
 def test_a_plain_callable_is_a_trajectory(robots):
@@ -109,17 +112,17 @@ def test_a_plain_callable_is_a_trajectory(robots):
     robot = robots["hu_2011_planar2"]
     law = SinePolynomial.between([0.1, 0.2], [0.5, -0.4], [-2, -2], [2, 2], 5.0)
     state = State(np.zeros(3), START_ATTITUDE, np.zeros(2))
-    ours = rollout(robot, law, state, num_steps=4)
-    theirs = rollout(robot, lambda t: law(t), state, duration=5.0, num_steps=4)
+    ours = jax.jit(lambda: rollout(robot, law, state, num_steps=4))()
+    theirs = jax.jit(lambda: rollout(robot, lambda t: law(t), state, duration=5.0, num_steps=4))()
     chex.assert_trees_all_close(ours, theirs, rtol=0, atol=1e-15)
 
 
-def test_none_is_zero_momentum_and_vmap_is_a_loop(robots):
+def test_no_momentum_is_zero_momentum_and_vmap_is_a_loop(robots):
     robot = robots["hu_2011_planar2"]
     trajectory, state = _setting(robot)
     batch = jnp.stack([jnp.zeros(6), MOMENTUM])
-    together = jax.jit(jax.vmap(lambda m: rollout(robot, trajectory, state, num_steps=10, momentum=m)))(batch)
-    none = jax.jit(lambda: rollout(robot, trajectory, state, num_steps=10))()
+    together = jax.jit(jax.vmap(lambda m: rollout(robot, trajectory, state, num_steps=4, momentum=m)))(batch)
+    none = jax.jit(lambda: rollout(robot, trajectory, state, num_steps=4))()
+    alone = jax.jit(lambda m: rollout(robot, trajectory, state, num_steps=4, momentum=m))(MOMENTUM)
     chex.assert_trees_all_close(jax.tree.map(lambda x: x[0], together), none, rtol=0, atol=1e-14)
-    alone = jax.jit(lambda m: rollout(robot, trajectory, state, num_steps=10, momentum=m))(MOMENTUM)
     chex.assert_trees_all_close(jax.tree.map(lambda x: x[1], together), alone, rtol=0, atol=1e-14)

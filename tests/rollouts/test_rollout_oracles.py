@@ -81,12 +81,8 @@ def test_poses_agree_with_the_oracle(motions, key, path):
     for name, value in expected.items():
         np.testing.assert_allclose(poses[name], value, rtol=0, atol=TOLERANCE, err_msg=name)
     np.testing.assert_allclose(motion.time[::every], [s["t"] for s in samples], rtol=0, atol=1e-13)
-    np.testing.assert_allclose(
-        motion.joint_position[::every], [s["q"] for s in samples], rtol=0, atol=1e-13
-    )
-    np.testing.assert_allclose(
-        motion.joint_velocity[::every], [s["qd"] for s in samples], rtol=0, atol=1e-13
-    )
+    np.testing.assert_allclose(motion.joint_position[::every], [s["q"] for s in samples], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(motion.joint_velocity[::every], [s["qd"] for s in samples], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("key", ["rollout", "rollout_nonzero_momentum"])
@@ -106,7 +102,9 @@ def test_shapes(motions):
     chex.assert_shape(motion.base_position, (STEPS + 1, 3))
     chex.assert_shape(motion.base_quaternion, (STEPS + 1, 4))
     chex.assert_shape(motion.base_twist, (STEPS + 1, 6))
-    chex.assert_shape([motion.joint_position, motion.joint_velocity, motion.joint_acceleration], (STEPS + 1, n))
+    chex.assert_shape(
+        [motion.joint_position, motion.joint_velocity, motion.joint_acceleration], (STEPS + 1, n)
+    )
     chex.assert_shape(motion.momentum, (6,))
     chex.assert_shape(motion.joint_grid.time, (2 * STEPS + 1,))
     chex.assert_shape(motion.joint_grid.joint_position, (2 * STEPS + 1, n))
