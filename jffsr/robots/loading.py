@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from jffsr.errors import InputError
+from jffsr.reading.complaints import complaint
+from jffsr.reading.did_you_mean import hint
+from jffsr.reading.files import read_text
+from jffsr.reading.sources import Sources
+from jffsr.reading.yaml_lines import parse
 from jffsr.robots.builder import build_robot
 from jffsr.robots.description import RobotDescription
 from jffsr.robots.robot import Robot
@@ -37,16 +43,13 @@ def describe_robot(name: str | Path) -> RobotDescription:
         key = text if text in catalogue else aliases.get(text)
         if key is not None:
             return catalogue[key].describe(f"catalogue robot '{key}'")
-        known = [*catalogue, *aliases]
-        near = difflib.get_close_matches(text, known, n=1, cutoff=0.0)
+        known = sorted([*catalogue, *aliases])
         raise InputError(
-            f"robot '{text}' is not in the catalogue; did you mean '{near[0]}'? "
-            f"(known: {', '.join(sorted(known))}; or give a path to a .yaml file)"
+            f"robot '{text}' is not in the catalogue{hint(text, known)} "
+            f"(known: {', '.join(known)}; or give a path to a .yaml file)"
         )
     path = Path(name)
-    if not path.is_file():
-        raise InputError(f"robot file '{path}' does not exist")
-    return _parse(path.read_text(encoding="utf-8"), str(path)).describe(str(path))
+    return _parse(read_text(path, text), text).describe(text)
 
 
 @lru_cache(maxsize=1)
@@ -61,6 +64,10 @@ def _catalogue() -> dict[str, RobotModel]:
 
 
 def _parse(text: str, origin: str) -> RobotModel:
-    import yaml
-
-    return RobotModel.model_validate(yaml.safe_load(text))
+    document = parse(text, origin)
+    if not isinstance(document.value, dict):
+        raise InputError(f"{origin}: a mapping with the keys {', '.join(RobotModel.model_fields)} is expected")
+    try:
+        return RobotModel.model_validate(document.value)
+    except ValidationError as error:
+        raise complaint(error, RobotModel, Sources((document.marks,))) from None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import PlainValidator
 
+from jffsr.reading.section import Section
+from jffsr.reading.values import choice, expected, sequence, text
 from jffsr.robots.description import (
     FIXED,
     EndEffectorDescription,
@@ -15,17 +17,32 @@ from jffsr.robots.description import (
     RobotDescription,
 )
 
-Number = Annotated[float, Field(strict=False, allow_inf_nan=True)]
-Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+def _any_float() -> PlainValidator:
+    """A number; one that is not finite passes, because the builder can name the body that it belongs to."""
+
+    def check(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise expected("a number")
+        try:
+            return float(value)
+        except OverflowError:
+            return float("inf")
+
+    return PlainValidator(check)
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+Number = Annotated[float, _any_float()]
+Triple = Annotated[tuple[Number, ...], sequence("a list of 3 numbers", 3, 3)]
+Pair = Annotated[tuple[Number, ...], sequence("a pair [low, high]", 2, 2)]
+Name = Annotated[str, text(r".{1,200}", "a name of at most 200 letters")]
+Prose = Annotated[str, text(r"(?s).{0,10000}", "a text")]
+
+_MOST = 1000
+_ORIGIN = (0.0, 0.0, 0.0)
 
 
-class InertiaModel(_Model):
+class InertiaModel(Section):
     """Elements of the inertia tensor about the centre of mass, link axes, kg m^2."""
 
     xx: Number
@@ -42,16 +59,16 @@ class InertiaModel(_Model):
         )
 
 
-class LinkModel(_Model):
+class LinkModel(Section):
     """A rigid link."""
 
     name: Name
     mass: Number
-    com: Triple = [0.0, 0.0, 0.0]
+    com: Triple = _ORIGIN
     inertia: InertiaModel
 
 
-class LimitsModel(_Model):
+class LimitsModel(Section):
     """Joint limits; each in rad or m, or in degrees under the key that ends in _deg."""
 
     position: Pair | None = None
@@ -63,41 +80,41 @@ class LimitsModel(_Model):
     torque: Number | None = None
 
 
-class JointModel(_Model):
+class JointModel(Section):
     """A joint between two links."""
 
     name: Name
-    type: Literal["revolute", "prismatic", "fixed"]
+    type: Annotated[Literal["revolute", "prismatic", "fixed"], choice("revolute", "prismatic", "fixed")]
     parent: Name
     child: Name
-    position: Triple = [0.0, 0.0, 0.0]
-    rpy_deg: Triple = [0.0, 0.0, 0.0]
+    position: Triple = _ORIGIN
+    rpy_deg: Triple = _ORIGIN
     axis: Triple | None = None
     limits: LimitsModel = LimitsModel()
 
 
-class EndEffectorModel(_Model):
+class EndEffectorModel(Section):
     """A tool frame fixed on a link."""
 
     name: Name
     link: Name
-    position: Triple = [0.0, 0.0, 0.0]
-    rpy_deg: Triple = [0.0, 0.0, 0.0]
+    position: Triple = _ORIGIN
+    rpy_deg: Triple = _ORIGIN
 
 
-class RobotModel(_Model):
+class RobotModel(Section):
     """A robot file."""
 
     name: Name
-    aliases: list[Name] = []
-    description: str = ""
-    source: str = ""
-    license: str = ""
-    notes: str = ""
+    aliases: Annotated[tuple[Name, ...], sequence("a list of names", 0, _MOST)] = ()
+    description: Prose = ""
+    source: Prose = ""
+    license: Prose = ""
+    notes: Prose = ""
     base: LinkModel
-    links: Annotated[list[LinkModel], Field(max_length=1000)] = []
-    joints: Annotated[list[JointModel], Field(max_length=1000)]
-    end_effectors: Annotated[list[EndEffectorModel], Field(max_length=1000)] = []
+    links: Annotated[tuple[LinkModel, ...], sequence("a list of links", 0, _MOST)] = ()
+    joints: Annotated[tuple[JointModel, ...], sequence("a list of joints", 1, _MOST)]
+    end_effectors: Annotated[tuple[EndEffectorModel, ...], sequence("a list of end effectors", 0, _MOST)] = ()
 
     def describe(self, origin: str) -> RobotDescription:
         """The description that the builder checks; `origin` is the file's name in messages."""
@@ -110,7 +127,7 @@ class RobotModel(_Model):
                 EndEffectorDescription(t.name, t.link, np.array(t.position), rpy_deg_to_matrix(t.rpy_deg))
                 for t in self.end_effectors
             ),
-            aliases=tuple(self.aliases),
+            aliases=self.aliases,
             description=self.description,
             source=self.source,
             license=self.license,
@@ -118,7 +135,7 @@ class RobotModel(_Model):
         )
 
 
-def rpy_deg_to_matrix(rpy_deg: list[float]) -> np.ndarray:
+def rpy_deg_to_matrix(rpy_deg: tuple[float, ...]) -> np.ndarray:
     """R = Rz(yaw) Ry(pitch) Rx(roll) of three angles in degrees, exact at multiples of 90 degrees."""
     rotation = np.eye(3)
     for axis, angle in enumerate(rpy_deg):

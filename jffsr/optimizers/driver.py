@@ -1,0 +1,206 @@
+"""The one loop: any optimizer, in compiled chunks, with progress, stopping and checkpoints on the host.
+
+A run is a list of phases, each an optimizer with its own stopping rule; a phase starts from the population
+that the one before left (hybrid: a swarm, then gradients). Between chunks the host reports, saves and looks
+for an interrupt. Chunks only group steps: their size does not change the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jffsr.errors import InputError
+from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
+from jffsr.types import Array
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Stop:
+    """When a phase ends: counts of its own iterations, objective and gradient evaluations, or a value."""
+
+    iterations: Array | float = np.inf
+    evaluations: Array | float = np.inf
+    gradient_evaluations: Array | float = np.inf
+    target: Array | float = -np.inf
+
+    def reached(self, progress: Progress) -> Array:
+        """Whether the phase is over."""
+        return (
+            progress.converged
+            | (progress.iteration >= self.iterations)
+            | (progress.evaluations >= self.evaluations)
+            | (progress.gradient_evaluations >= self.gradient_evaluations)
+            | (progress.best_value <= self.target)
+        )
+
+
+@dataclass(frozen=True)
+class Phase:
+    """An optimizer, its name in reports, and when it ends."""
+
+    name: str
+    optimizer: Optimizer
+    stop: Stop = field(default_factory=Stop)
+
+
+class Record(NamedTuple):
+    """One iteration of the history; evaluations are counted from the start of the run."""
+
+    phase: int
+    iteration: int
+    evaluations: int
+    gradient_evaluations: int
+    best_value: float
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Everything a run needs to go on: the phase, its state, and the history so far."""
+
+    phase: int
+    state: Any
+    history: tuple[Record, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run found. `reason` is converged, budget, target or interrupted."""
+
+    best_position: np.ndarray
+    best_value: float
+    evaluations: int
+    gradient_evaluations: int
+    history: tuple[Record, ...]
+    reason: str
+    population: Population
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the run was stopped before its end."""
+        return self.reason == "interrupted"
+
+
+@jax.jit
+def _init(optimizer, problem, key, population):
+    return optimizer.init(key, problem, population)
+
+
+def _advance(optimizer, problem, state, stop, length):
+    def one(state, _):
+        state = jax.lax.cond(
+            stop.reached(state.progress), lambda s: s, lambda s: optimizer.step(problem, s), state
+        )
+        p = state.progress
+        return state, (p.iteration, p.evaluations, p.gradient_evaluations, p.best_value)
+
+    return jax.lax.scan(one, state, length=length)
+
+
+_advance_jit = jax.jit(_advance, static_argnums=4)
+
+
+def run(
+    phases: list[Phase],
+    problem: OptimizationProblem,
+    key: Array,
+    *,
+    chunk: int = 10,
+    population: Population | None = None,
+    resume: Snapshot | None = None,
+    on_chunk: Callable[[Snapshot], None] | None = None,
+    interrupted: Callable[[], bool] = lambda: False,
+) -> Outcome:
+    """Run the phases one after another and return the best point found.
+
+    `on_chunk` sees a snapshot after every chunk (and after each phase's first evaluations), from which
+    `resume` goes on to the same bits. `interrupted` is asked between chunks.
+    """
+    if not phases:
+        raise InputError("there is no phase to run")
+    history: list[Record] = list(resume.history) if resume else []
+    first = resume.phase if resume else 0
+    state = resume.state if resume else None
+    for index in range(first, len(phases)):
+        phase = phases[index]
+        before = _evaluations_before(history, index)
+        if state is None:
+            state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
+            p = jax.device_get(state.progress)
+            history.append(_record(index, before, p.iteration, p.evaluations, p.gradient_evaluations, p.best_value))
+            _tell(on_chunk, index, state, history)
+        while not bool(phase.stop.reached(state.progress)):
+            if interrupted():
+                return _outcome(phase, state, history, "interrupted")
+            last = int(state.progress.iteration)
+            state, rows = _advance_jit(phase.optimizer, problem, state, phase.stop, chunk)
+            for row in zip(*jax.device_get(rows), strict=True):
+                if row[0] > last:
+                    last = row[0]
+                    history.append(_record(index, before, *row))
+            _tell(on_chunk, index, state, history)
+        best = float(state.progress.best_value)
+        reason = _reason(phase.stop, state.progress, best)
+        if reason == "target" or index == len(phases) - 1:
+            return _outcome(phase, state, history, reason)
+        population, state = phase.optimizer.population(state), None
+    raise AssertionError("unreachable")
+
+
+def _reason(stop: Stop, progress: Progress, best: float) -> str:
+    if best <= float(stop.target):
+        return "target"
+    return "converged" if bool(progress.converged) else "budget"
+
+
+def _tell(on_chunk, index, state, history) -> None:
+    if on_chunk is not None:
+        on_chunk(Snapshot(index, state, tuple(history)))
+
+
+def _evaluations_before(history: list[Record], phase: int) -> tuple[int, int]:
+    earlier = [record for record in history if record.phase < phase]
+    return (earlier[-1].evaluations, earlier[-1].gradient_evaluations) if earlier else (0, 0)
+
+
+def _record(phase, before, iteration, evaluations, gradient_evaluations, best) -> Record:
+    return Record(
+        phase,
+        int(iteration),
+        before[0] + int(evaluations),
+        before[1] + int(gradient_evaluations),
+        float(best),
+    )
+
+
+def _outcome(phase: Phase, state, history: list[Record], reason: str) -> Outcome:
+    progress = jax.device_get(state.progress)
+    return Outcome(
+        best_position=np.asarray(progress.best_position),
+        best_value=float(progress.best_value),
+        evaluations=history[-1].evaluations,
+        gradient_evaluations=history[-1].gradient_evaluations,
+        history=tuple(history),
+        reason=reason,
+        population=jax.device_get(phase.optimizer.population(state)),
+    )
+
+
+def blank_state(phases: list[Phase], index: int, problem: OptimizationProblem, key: Array):
+    """Shapes of the state of a phase, without computing it: what a checkpoint is read into."""
+    population = None
+    for number, phase in enumerate(phases[: index + 1]):
+        shape = jax.eval_shape(
+            lambda o, p, k, pop: o.init(k, p, pop), phase.optimizer, problem, jax.random.fold_in(key, number), population
+        )
+        if number < index:
+            population = jax.eval_shape(phase.optimizer.population, shape)
+    return shape
+
+
+__all__ = ["Outcome", "Phase", "Record", "Snapshot", "Stop", "blank_state", "run"]

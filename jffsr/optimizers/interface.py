@@ -1,0 +1,106 @@
+"""What an optimizer is, and what it optimizes.
+
+An optimizer is a frozen dataclass registered as a pytree, its hyperparameters traced, its sizes static, with
+`init(key, problem, population) -> state` and `step(problem, state) -> state`. Everything that changes is in
+the state, which is therefore the checkpoint. One driver runs them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+import jax
+import jax.numpy as jnp
+
+from jffsr.types import Array, Scalar, Vector
+
+
+class OptimizationProblem(Protocol):
+    """A box and an objective, written for one candidate (d,).
+
+    `value` is what is minimised and reported. `smooth_and_value` gives a differentiable stand-in for it
+    together with the value itself.
+    """
+
+    def bounds(self) -> tuple[Vector, Vector]: ...
+
+    def value(self, candidate: Vector) -> Scalar: ...
+
+    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]: ...
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class FunctionProblem:
+    """Any function of one candidate, with bounds (d,) each; the function is static."""
+
+    lower: Array
+    upper: Array
+    function: Callable[[Vector], Scalar] = field(metadata={"static": True})
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lower and upper bounds."""
+        return self.lower, self.upper
+
+    def value(self, candidate: Vector) -> Scalar:
+        """The function."""
+        return self.function(candidate)
+
+    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]:
+        """The function twice: it is its own stand-in."""
+        value = self.function(candidate)
+        return value, value
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Progress:
+    """What every optimizer's state carries for the driver.
+
+    best_position (d,) and best_value (), the best finite point so far; iteration (); evaluations () of the
+    objective and gradient_evaluations () counted apart; converged (), whether more steps would be idle.
+    """
+
+    best_position: Array
+    best_value: Array
+    iteration: Array
+    evaluations: Array
+    gradient_evaluations: Array
+    converged: Array
+
+
+class Population(NamedTuple):
+    """Candidates (k, d) and their values (k,), handed from one optimizer to the next."""
+
+    positions: Array
+    values: Array
+
+
+class Optimizer(Protocol):
+    """See the module's text; `population` gives the candidates that the next phase may start from."""
+
+    def init(self, key: Array, problem: OptimizationProblem, population: Population | None): ...
+
+    def step(self, problem: OptimizationProblem, state): ...
+
+    def population(self, state) -> Population: ...
+
+
+def finite_or_inf(values: Array) -> Array:
+    """Values with everything that is not finite made +inf: argmin would return the index of a NaN."""
+    return jnp.where(jnp.isfinite(values), values, jnp.inf)
+
+
+def better_of(position: Vector, value: Scalar, positions: Array, values: Array) -> tuple[Vector, Scalar]:
+    """The best of one point and a batch (k, d), (k,); a tie keeps the one point."""
+    index = jnp.argmin(values)
+    wins = values[index] < value
+    return jnp.where(wins, positions[index], position), jnp.where(wins, values[index], value)
+
+
+def sample_box(key: Array, problem: OptimizationProblem, count: int) -> Array:
+    """Candidates (count, d) uniform in the box."""
+    lower, upper = (jnp.asarray(bound, dtype=float) for bound in problem.bounds())
+    return jax.random.uniform(key, (count, lower.shape[0]), minval=lower, maxval=upper)

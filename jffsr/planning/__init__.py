@@ -1,0 +1,1 @@
+"""Problem = robot + trajectory + objective; plans, their verification and result codes."""

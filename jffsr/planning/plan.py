@@ -1,0 +1,123 @@
+"""A finished plan, and how a problem becomes one: search, then verify."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jffsr.errors import InputError
+from jffsr.objectives.composite import TermValue
+from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
+from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.planning.problem import Problem
+from jffsr.planning.result import Result, ResultCode, Tolerances, explain, result_code
+from jffsr.planning.stopwatch import Stopwatch
+from jffsr.planning.verification import Verification, verify
+from jffsr.rollouts.motion import Motion
+from jffsr.trajectories.interface import PlannedTrajectory
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A verified plan, all numbers on the host.
+
+    cost and terms are the published index of the motion at the planner's own step; verification has them
+    again at the finer one, by which `result` judges. free holds the chosen free numbers (k,). evaluations and
+    gradient_evaluations are counted apart; history has one record an iteration; seconds: compile, run, total.
+    """
+
+    problem: Problem
+    result: Result
+    cost: float
+    terms: dict[str, TermValue]
+    free: np.ndarray
+    trajectory: PlannedTrajectory
+    motion: Motion
+    verification: Verification
+    evaluations: int
+    gradient_evaluations: int
+    history: tuple[Record, ...]
+    reason: str
+    seconds: dict[str, float]
+
+    def first_at(self, value: float) -> Record | None:
+        """The first record of the history whose best value is at most `value`."""
+        return next((record for record in self.history if record.best_value <= value), None)
+
+
+@partial(jax.jit, static_argnums=2)
+def _verified(problem: Problem, candidate, step_factor: int):
+    motion, verification = verify(problem, candidate, step_factor)
+    return motion, problem.objective.breakdown(problem.robot, motion), verification
+
+
+def solve(
+    problem: Problem,
+    optimizer: str = "hybrid",
+    settings: Settings | None = None,
+    *,
+    seed: int = 0,
+    chunk: int = 10,
+    step_factor: int = 4,
+    tolerances: Tolerances | None = None,
+    resume: Snapshot | None = None,
+    on_chunk: Callable[[Snapshot], None] | None = None,
+    interrupted: Callable[[], bool] = lambda: False,
+) -> Plan:
+    """Search with a registered optimizer, verify what it found, and say what became of it."""
+    tolerances = tolerances or Tolerances()
+    settings = settings or Settings()
+    _check_precision()
+    with Stopwatch() as watch:
+        outcome = run(
+            build_phases(optimizer, settings),
+            problem,
+            jax.random.key(seed),
+            chunk=chunk,
+            resume=resume,
+            on_chunk=on_chunk,
+            interrupted=interrupted,
+        )
+        verified = _verified(problem, jnp.asarray(outcome.best_position), step_factor)
+        code = result_code(problem, verified[2], _at_its_end(outcome), tolerances)
+        motion, terms, verification = jax.device_get(verified)
+    result = explain(int(code), problem, verification, tolerances)
+    if outcome.interrupted:
+        result = explain(ResultCode.INTERRUPTED, problem, verification, tolerances)
+    return Plan(
+        problem=problem,
+        result=result,
+        cost=outcome.best_value,
+        terms=terms,
+        free=outcome.best_position,
+        trajectory=jax.device_get(problem.trajectory.with_free(jnp.asarray(outcome.best_position))),
+        motion=motion,
+        verification=verification,
+        evaluations=outcome.evaluations,
+        gradient_evaluations=outcome.gradient_evaluations,
+        history=outcome.history,
+        reason=outcome.reason,
+        seconds=watch.as_dict(),
+    )
+
+
+def _at_its_end(outcome: Outcome) -> bool:
+    """Whether the search had stopped improving: by its own word, or 1 % in the last tenth of its steps."""
+    if outcome.reason in ("converged", "target"):
+        return True
+    values = [record.best_value for record in outcome.history]
+    earlier = values[-1 - max(1, len(values) // 10)] if len(values) > 1 else np.inf
+    return bool(np.isfinite(earlier) and earlier - values[-1] <= 0.01 * abs(earlier))
+
+
+def _check_precision() -> None:
+    if not jax.config.jax_enable_x64:
+        raise InputError(
+            "planning needs float64: call jax.config.update('jax_enable_x64', True) first "
+            "(or ask for precision: float32)"
+        )

@@ -1,0 +1,62 @@
+"""A planning problem: a robot, a trajectory with free numbers, an index, and where the motion begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import jax
+import numpy as np
+
+from jffsr.objectives.composite import CompositeIndex, TermValue
+from jffsr.robots.robot import Robot
+from jffsr.robots.state import State
+from jffsr.rollouts.motion import Motion
+from jffsr.rollouts.rollout import rollout
+from jffsr.trajectories.interface import PlannedTrajectory
+from jffsr.types import Array, Scalar, Vector
+
+
+def _at_rest_at_origin() -> State:
+    return State(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(0))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Problem:
+    """Choose the free numbers of `trajectory` so that the index of the motion is least.
+
+    initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
+    L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps. All else is
+    traced: problems of one robot with other numbers share their compiled programs.
+    """
+
+    robot: Robot
+    trajectory: PlannedTrajectory
+    objective: CompositeIndex
+    initial_state: State = field(default_factory=_at_rest_at_origin)
+    momentum: Array = field(default_factory=lambda: np.zeros(6))
+    num_steps: int = field(default=100, metadata={"static": True})
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Lower and upper bounds (k,) of the free numbers."""
+        return self.trajectory.free_bounds()
+
+    def motion(self, candidate: Vector) -> Motion:
+        """The motion under the free numbers (k,)."""
+        trajectory = self.trajectory.with_free(candidate)
+        return rollout(
+            self.robot, trajectory, self.initial_state, num_steps=self.num_steps, momentum=self.momentum
+        )
+
+    def value(self, candidate: Vector) -> Scalar:
+        """The published index."""
+        return self.objective.value(self.robot, self.motion(candidate))
+
+    def smooth_and_value(self, candidate: Vector) -> tuple[Scalar, Scalar]:
+        """The smooth index and the published one, of the same motion."""
+        motion = self.motion(candidate)
+        return self.objective.smooth(self.robot, motion), self.objective.value(self.robot, motion)
+
+    def terms(self, candidate: Vector) -> dict[str, TermValue]:
+        """Every term of the published index by name, before and after weighting."""
+        return self.objective.breakdown(self.robot, self.motion(candidate))

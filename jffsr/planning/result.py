@@ -1,0 +1,126 @@
+"""Result codes: what became of a plan, as a number in arrays and as a sentence of advice on the host."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+import jax.numpy as jnp
+import numpy as np
+
+from jffsr.planning.problem import Problem
+from jffsr.planning.verification import Overruns, Verification
+from jffsr.types import Array
+
+
+class ResultCode(IntEnum):
+    """0 is the only success."""
+
+    ACCURACY_MET = 0
+    ACCURACY_NOT_MET = 1
+    LIMITS_VIOLATED = 2
+    NOT_CONVERGED = 3
+    NOT_VERIFIED = 4
+    NOT_FINITE = 5
+    INTERRUPTED = 6
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """What the verification must keep: limits (relative), attitude (rad), momentum (relative), boundary."""
+
+    limit: float = 1e-3
+    attitude: float = 1e-6
+    momentum: float = 1e-6
+    boundary: float = 1e-8
+
+
+@dataclass(frozen=True)
+class Result:
+    """A code, its name, and a sentence that says what to do."""
+
+    code: ResultCode
+    sentence: str
+
+    @property
+    def success(self) -> bool:
+        """Whether the accuracy asked for was met and verified."""
+        return self.code is ResultCode.ACCURACY_MET
+
+
+def result_code(problem: Problem, verification: Verification, converged: Array, tolerances: Tolerances) -> Array:
+    """The code as an int32 array; works under vmap. `converged` is whether the search had come to its end."""
+    largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in _KINDS]))
+    finite = jnp.isfinite(verification.cost)
+    verified = (
+        (verification.attitude_difference <= tolerances.attitude)
+        & (verification.momentum_drift <= tolerances.momentum)
+        & (verification.boundary_error <= tolerances.boundary)
+    )
+    met = verification.cost <= problem.objective.accuracy
+    short = jnp.where(converged, ResultCode.ACCURACY_NOT_MET, ResultCode.NOT_CONVERGED)
+    code = jnp.where(met, ResultCode.ACCURACY_MET, short)
+    code = jnp.where(met & (largest > tolerances.limit), ResultCode.LIMITS_VIOLATED, code)
+    code = jnp.where(verified, code, ResultCode.NOT_VERIFIED)
+    return jnp.where(finite, code, ResultCode.NOT_FINITE).astype(jnp.int32)
+
+
+_KINDS = ("position", "rate", "acceleration", "excursion")
+
+
+def explain(
+    code: int, problem: Problem, verification: Verification, tolerances: Tolerances, reason: str = ""
+) -> Result:
+    """The sentence of advice that goes with a code; host only. `reason` is why the search ended."""
+    code = ResultCode(int(code))
+    cost, accuracy = float(verification.cost), float(problem.objective.accuracy)
+    broken = list(violations(problem, verification.overruns, tolerances))
+    also = f"; limits violated: {', '.join(broken)}" if broken else "; every limit is kept"
+    binding = _binding(verification)
+    if code is ResultCode.ACCURACY_MET:
+        text = f"accuracy met: J = {cost:.4g} <= {accuracy:g}, and every limit is kept on the finer grid"
+    elif code is ResultCode.LIMITS_VIOLATED:
+        text = (
+            f"J = {cost:.4g} <= {accuracy:g}, but limits are violated: {', '.join(broken)}; lower the scale of "
+            f"that term, or allow more time"
+        )
+    elif code is ResultCode.ACCURACY_NOT_MET:
+        text = (
+            f"accuracy not met: J = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search had converged, "
+            f"so allow more time or excursion, or try more starts"
+        )
+    elif code is ResultCode.NOT_CONVERGED:
+        text = (
+            f"accuracy not met: J = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search was still "
+            f"moving when its budget ended, so raise the budget"
+        )
+    elif code is ResultCode.NOT_VERIFIED:
+        text = "not verified: " + ", ".join(_unverified(verification, tolerances)) + "; raise rollout.num_steps"
+    elif code is ResultCode.INTERRUPTED:
+        text = "interrupted: a checkpoint was written; the same command goes on from there"
+    else:
+        text = "no finite index was found: every candidate gave NaN or infinity; check the robot and the terms"
+    return Result(code, text if reason != "interrupted" else f"{text} (interrupted)")
+
+
+def _binding(verification: Verification) -> str:
+    name, term = max(verification.terms.items(), key=lambda item: float(item[1].weighted))
+    return f"{name} ({float(term.weighted):.3g} of J)"
+
+
+def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[str]:
+    for what, unit in (("attitude_difference", " rad"), ("momentum_drift", " relative"), ("boundary_error", "")):
+        value, allowed = float(getattr(verification, what)), getattr(tolerances, what.split("_")[0])
+        if not value <= allowed:
+            yield f"{what.replace('_', ' ')} of {value:.3g}{unit} (allowed {allowed:g})"
+
+
+def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:
+    """Each limit that is overrun by more than the tolerance, with its joint or axis and by how much."""
+    for kind in _KINDS:
+        names = "xyz" if kind == "excursion" else problem.robot.joint_names
+        of = "base attitude excursion about" if kind == "excursion" else f"{kind} of"
+        for name, overrun in zip(names, np.asarray(getattr(overruns, kind)), strict=True):
+            if overrun > tolerances.limit:
+                yield f"{of} {name} by {100 * overrun:.3g} %"

@@ -1,0 +1,41 @@
+"""Where the time of a run went: compiling or running."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+import jax.monitoring
+
+# Tracing is left out of the sum: JAX reports the traces of inner functions again within the outer one's.
+_COMPILING = (
+    "/jax/core/compile/jaxpr_to_mlir_module_duration",
+    "/jax/core/compile/backend_compile_duration",
+)
+_compiled = 0.0
+
+
+def _listen(event: str, duration: float, **_: object) -> None:
+    global _compiled
+    if event in _COMPILING:
+        _compiled += duration
+
+
+jax.monitoring.register_event_duration_secs_listener(_listen)
+
+
+class Stopwatch:
+    """Context manager; afterwards `total`, `compile` and `run`, s (compile: lowering and compilation)."""
+
+    def __enter__(self) -> Stopwatch:
+        self._start, self._compiled = time.perf_counter(), _compiled
+        return self
+
+    def __exit__(self, kind: type | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        self.total = time.perf_counter() - self._start
+        self.compile = _compiled - self._compiled
+        self.run = max(0.0, self.total - self.compile)
+
+    def as_dict(self) -> dict[str, float]:
+        """For summaries."""
+        return {"compile": self.compile, "run": self.run, "total": self.total}

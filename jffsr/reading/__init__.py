@@ -1,0 +1,1 @@
+"""Reading what users write: text files, YAML with the line of every key, and errors told in one sentence."""

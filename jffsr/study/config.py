@@ -1,0 +1,75 @@
+"""Reading a study's configuration and writing it back."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+
+import yaml
+from pydantic import ValidationError
+
+from jffsr.errors import InputError
+from jffsr.reading.complaints import complaint
+from jffsr.study.composition import compose
+from jffsr.study.lookup import find_config
+from jffsr.study.schema import PlanningConfig
+
+KINDS = {"planning": PlanningConfig}
+
+
+def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] = ()) -> PlanningConfig:
+    """The configuration of a study, given as a path or a name under `configs/`, with `a.b=value` overrides.
+
+    Raises InputError: one sentence with the file and line (or the override), the key, what was found, and
+    what is expected.
+    """
+    path = find_config(path_or_name)
+    values, sources = compose(path, overrides)
+    if values.get("name") is None:
+        values["name"] = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:100]
+    if values.get("kind") is None:
+        raise InputError(f"{sources.where('kind')}: missing, 'kind: planning' is expected")
+    kind = values["kind"]
+    # An unknown kind is told by the planning schema, which knows the allowed ones.
+    model = KINDS.get(kind, PlanningConfig) if isinstance(kind, str) else PlanningConfig
+    try:
+        config = model.model_validate(values)
+    except ValidationError as error:
+        raise complaint(error, model, sources) from None
+    config._sources = sources
+    return config
+
+
+def dump_config(config: PlanningConfig) -> str:
+    """The resolved configuration as YAML, every default written out; load_config reads it as an equal one."""
+    return yaml.dump(
+        _plain(config.model_dump()), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110
+    )
+
+
+class _Dumper(yaml.SafeDumper):
+    """Short lists on one line, no anchors, and text quoted that the reader would take for a number."""
+
+    def ignore_aliases(self, data) -> bool:
+        return True
+
+    def represent_dict(self, data) -> yaml.Node:
+        return self.represent_mapping("tag:yaml.org,2002:map", data, flow_style=False)
+
+    def represent_list(self, data) -> yaml.Node:
+        flat = not any(isinstance(item, dict) for item in data)
+        return self.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=flat)
+
+
+_Dumper.add_representer(list, _Dumper.represent_list)
+_Dumper.add_representer(dict, _Dumper.represent_dict)
+_Dumper.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9.]+[eE][-+]?[0-9]+\Z"), list("-+.0123456789")
+)
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

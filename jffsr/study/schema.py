@@ -1,0 +1,82 @@
+"""The typed configuration of a planning study; every default is visible here and in the sections' files."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import PrivateAttr, model_validator
+
+from jffsr.errors import InputError
+from jffsr.study.schema_objective import TERMS, Objective
+from jffsr.study.schema_solver import Optimizer, Output, Rollout, Trajectory, Verification
+from jffsr.study.schema_task import Limits, Task
+from jffsr.reading.section import Section
+from jffsr.reading.sources import Sources
+from jffsr.reading.values import choice, conflict, text, whole
+
+NAME = r"(?!\.+\Z)[A-Za-z0-9_.-]{1,100}"  # also the name of a folder, so not . or ..
+
+
+class PlanningConfig(Section):
+    """One planning study: plain values, validated; equal ones compare equal wherever they were written."""
+
+    kind: Annotated[Literal["planning"], choice("planning")]
+    name: Annotated[str, text(NAME, "a name of at most 100 letters, digits, '_', '.' and '-'")]
+    robot: Annotated[str, text(r".{1,4000}", "a name of the catalogue or a path to a robot's file")]
+    limits: Limits = Limits()
+    task: Task
+    trajectory: Trajectory = Trajectory()
+    objective: Objective = Objective()
+    rollout: Rollout = Rollout()
+    optimizer: Optimizer = Optimizer()
+    verification: Verification = Verification()
+    output: Output = Output()
+    seed: Annotated[int, whole(0, 2**32 - 1)] = 0
+    precision: Annotated[Literal["float64", "float32"], choice("float64", "float32")] = "float64"
+
+    _sources: Sources = PrivateAttr(default_factory=Sources)
+
+    @model_validator(mode="after")
+    def _check(self) -> PlanningConfig:
+        if self.objective.goal_attitude.enabled and self.task.goal_attitude is None:
+            key = "objective.goal_attitude.enabled"
+            raise conflict("found true, but no 'task.goal_attitude' is given", key)
+        if not self.enabled_terms:
+            sentence = "no term counts (an excursion only under a limit), at least one is expected"
+            raise conflict(sentence, "objective")
+        return self
+
+    def term_enabled(self, name: str) -> bool:
+        """Whether a built-in term counts, its null resolved; the excursion counts only under a limit."""
+        enabled = getattr(self.objective, name).enabled
+        if name == "attitude_change" and enabled is None:
+            return self.task.goal_attitude is None
+        if name == "goal_attitude" and enabled is None:
+            return self.task.goal_attitude is not None
+        if name == "attitude_excursion":
+            return enabled and self.limits.base_excursion_si is not None
+        return enabled
+
+    @property
+    def enabled_terms(self) -> tuple[str, ...]:
+        """Names of all terms that count, built-in ones first, in the order of the results."""
+        return (*filter(self.term_enabled, TERMS), *(term.label for term in self.objective.terms))
+
+    def where(self, key: str) -> str:
+        """Place and key for a message: `configs/x.yaml:12: task.goal_deg`; of a default, its section's."""
+        return self._sources.where(key)
+
+    def per_joint(self, quantity: str, num_joints: int) -> tuple | None:
+        """The limit `position` ((low, high) each), `rate` or `acceleration` of each joint; rad or m, s.
+
+        None when not given. Raises InputError when a list is given whose length is not the number of joints.
+        """
+        value = getattr(self.limits, f"{quantity}_si")
+        if value is None:
+            return None
+        if not isinstance(getattr(self.limits, self.limits.key_of(quantity)), tuple):
+            return (value,) * num_joints
+        if len(value) != num_joints:
+            where = self.where(f"limits.{self.limits.key_of(quantity)}")
+            raise InputError(f"{where}: found a list of {len(value)}, the robot has {num_joints} joints")
+        return value

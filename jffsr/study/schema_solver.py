@@ -1,0 +1,77 @@
+"""The sections that say how a plan is searched, checked and shown."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from jffsr.reading.section import Section
+from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
+
+Positive = Annotated[float, number(gt=0)]
+Flag = Annotated[bool, flag()]
+# Above 1.781 (e to Euler's constant) a particle drawn by QPSO wanders off instead of settling.
+Coefficient = Annotated[float, number(gt=0, lt=1.781)]
+Contraction = Annotated[tuple[Coefficient, ...], sequence("a pair of numbers in (0, 1.781)", 2, 2)]
+
+
+class Trajectory(Section):
+    """The joint law and the half width of the box of its free numbers."""
+
+    kind: Annotated[Literal["sine_polynomial"], choice("sine_polynomial")] = "sine_polynomial"
+    box: Positive = math.pi
+
+
+class Rollout(Section):
+    """Steps of the base motion's integration."""
+
+    num_steps: Annotated[int, whole(4, 100_000)] = 100
+
+
+class Optimizer(Section):
+    """The search; a swarm, gradients from several starts, or gradients from the best of a swarm."""
+
+    kind: Annotated[Literal["qpso", "hybrid", "gradient"], choice("qpso", "hybrid", "gradient")] = "hybrid"
+    particles: Annotated[int, whole(2, 100_000)] = 50
+    evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # qpso: the whole budget
+    swarm_evaluations: Annotated[int, whole(1, 10**9)] = 200  # hybrid: budget of the swarm phase
+    contraction: Contraction = (1.0, 0.5)  # contraction-expansion coefficient: from, to
+    starts: Annotated[int, whole(1, 10_000)] = 4  # gradient: starts; hybrid: best particles refined
+    gradient_iterations: Annotated[int, whole(0, 10**6)] = 60
+    method: Annotated[Literal["lbfgs", "adam"], choice("lbfgs", "adam")] = "lbfgs"
+    learning_rate: Positive = 0.05  # adam
+    memory: Annotated[int, whole(1, 1000)] = 10  # lbfgs
+    target: Annotated[float, number(ge=0, instead=" or null")] | None = None
+    chunk: Annotated[int, whole(1, 10**6)] = 10  # iterations between two looks of the host
+
+    @model_validator(mode="after")
+    def _check(self) -> Optimizer:
+        for kind, budget in (("hybrid", "swarm_evaluations"), ("qpso", "evaluations")):
+            value = getattr(self, budget)
+            if self.kind == kind and value < self.particles:
+                sentence = (
+                    f"found {value}, at least one for each of the {self.particles} particles is expected"
+                )
+                raise conflict(sentence, budget)
+        if self.kind == "hybrid" and self.starts > self.particles:
+            sentence = f"found {self.starts}, at most the number of particles ({self.particles}) is expected"
+            raise conflict(sentence, "starts")
+        return self
+
+
+class Verification(Section):
+    """The finer re-run of a finished plan and what it must keep."""
+
+    step_factor: Annotated[int, whole(2, 1000)] = 4
+    limit_tolerance: Positive = 1e-3
+    attitude_tolerance: Positive = 1e-6
+    momentum_tolerance: Positive = 1e-6
+
+
+class Output(Section):
+    """What is shown and drawn."""
+
+    figures: Flag = True
+    progress: Flag = True

@@ -1,0 +1,228 @@
+"""Configurations: composition, overrides, round trip, and the line of every key."""
+
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from jffsr.errors import InputError
+from jffsr.study.config import dump_config, load_config
+from jffsr.study.schema import PlanningConfig
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = sorted((ROOT / "configs" / "planning").glob("*.yaml"))
+
+GOOD = """\
+kind: planning
+robot: wu_6dof
+task:
+  start_deg: [0, 90]
+  goal_deg: [45, 3]
+  duration: 30
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(name, text):
+    Path(name).parent.mkdir(parents=True, exist_ok=True)
+    Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return name
+
+
+def load(text, *overrides):
+    return load_config(write("x.yaml", text), overrides)
+
+
+# --- what a good file gives ---
+
+
+def test_defaults_are_those_of_the_schema():
+    config = load(GOOD)
+    assert (config.name, config.robot, config.seed, config.precision) == ("x", "wu_6dof", 0, "float64")
+    assert config.optimizer.kind == "hybrid" and config.optimizer.contraction == (1.0, 0.5)
+    assert config.objective.attitude_change.scale_si == math.radians(0.1)
+    assert config.trajectory.box == math.pi
+    assert config.limits.rate_si is None and config.limits.base_excursion_si is None
+    # No limit to the excursion is given, so that its term does not count.
+    assert config.enabled_terms == ("attitude_change", "joint_rate", "joint_acceleration")
+
+
+def test_degrees_become_radians_and_radians_stay():
+    config = load(GOOD + "limits: {position_deg: 180, rate: 0.25, acceleration_deg: [9, 18]}\n")
+    assert config.task.start_si == (0.0, math.pi / 2)
+    assert config.limits.position_si == (-math.pi, math.pi)
+    assert config.per_joint("rate", 2) == (0.25, 0.25)
+    assert config.per_joint("acceleration", 2) == (math.radians(9), math.radians(18))
+    assert config.per_joint("position", 2) == ((-math.pi, math.pi),) * 2
+    pairs = load(GOOD + "limits: {position: [[-1, 2], [0, 1e-3]], base_excursion_deg: 10}\n")
+    assert pairs.per_joint("position", 2) == ((-1.0, 2.0), (0.0, 0.001))
+    assert pairs.limits.base_excursion_si == (math.radians(10),) * 3
+    assert pairs.per_joint("rate", 2) is None
+
+
+def test_a_limit_for_another_number_of_joints_is_refused_with_its_line():
+    config = load(GOOD + "limits:\n  rate_deg: [1, 2]\n")
+    with pytest.raises(InputError) as caught:
+        config.per_joint("rate", 6)
+    assert str(caught.value) == "x.yaml:8: limits.rate_deg: found a list of 2, the robot has 6 joints"
+
+
+def test_duration_is_given_or_free():
+    assert load(GOOD).task.duration_range == (30.0, 30.0) and not load(GOOD).task.duration_is_free
+    free = load(GOOD.replace("30", "{min: 10, max: 40}")).task
+    assert free.duration_range == (10.0, 40.0) and free.duration_is_free
+
+
+def test_a_goal_attitude_turns_one_term_on_and_another_off():
+    config = load(GOOD + "  goal_attitude: [1.0005, 0, 0, 0]\n")
+    assert config.task.goal_attitude == (1.0, 0.0, 0.0, 0.0)
+    assert config.enabled_terms == ("joint_rate", "joint_acceleration", "goal_attitude")
+    own = load(GOOD + "objective: {terms: [{call: my_pkg.my_term}, {call: a.b, name: c}]}\n")
+    assert own.enabled_terms[-2:] == ("my_term", "c")
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [("1e-3", 0.001), ("1E3", 1000.0), ("+.5", 0.5), ("5.", 5.0), ("1_000", 1000.0), ("7", 7.0)],
+)
+def test_numbers_as_people_write_them(written, read):
+    assert load(GOOD + f"limits: {{rate: {written}}}\n").limits.rate == read
+
+
+def test_whole_numbers_may_have_an_exponent_and_switches_may_say_no():
+    config = load(GOOD + "optimizer: {evaluations: 2e4}\noutput: {figures: no}\n")
+    assert config.optimizer.evaluations == 20000 and type(config.optimizer.evaluations) is int
+    assert config.output.figures is False
+
+
+def test_null_takes_back_what_another_file_gave():
+    write("base.yaml", GOOD)
+    config = load("defaults: [base]\ntask: {start_deg: null, start: [0, 1]}\n")
+    assert config.task.start_si == (0.0, 1.0)
+
+
+# --- composition and overrides ---
+
+
+def test_later_defaults_win_and_the_file_wins_over_all():
+    write("parts/robot.yaml", GOOD + "seed: 1\nname: other\nrollout: {num_steps: 10}\n")
+    write("parts/more.yml", "seed: 2\nrollout: {num_steps: 20}\noptimizer: {particles: 8}\n")
+    config = load("defaults: [parts/robot, parts/more.yml]\nrollout: {num_steps: 30}\n")
+    assert (config.seed, config.rollout.num_steps, config.optimizer.particles) == (2, 30, 8)
+    assert config.name == "x", "a name belongs to the file that gives it"
+    assert config.task.goal_si == (math.radians(45), math.radians(3))
+
+
+def test_defaults_are_relative_to_their_own_file():
+    write("a/b/deep.yaml", GOOD)
+    write("a/mid.yaml", "defaults: [b/deep]\nseed: 4\n")
+    assert load("defaults: [a/mid]\n").seed == 4
+
+
+def test_overrides_win_in_order():
+    config = load(
+        GOOD,
+        "seed=5",
+        "seed=6",
+        "optimizer.particles=64",
+        "task.goal_deg=[1, 2]",
+        "task.goal_deg.0=10",
+        "task.duration={min: 1, max: 2}",
+        "name='1e-3'",
+        "objective.terms=[{call: a.b}]",
+    )
+    assert config.seed == 6 and config.optimizer.particles == 64
+    assert config.task.goal_deg == (10.0, 2.0)
+    assert config.task.duration_range == (1.0, 2.0)
+    assert config.name == "1e-3" and config.objective.terms[0].call == "a.b"
+
+
+def test_a_robot_file_is_found_relative_to_the_file_that_names_it():
+    write("sub/base.yaml", GOOD.replace("wu_6dof", "../robots/mine.yaml"))
+    assert load("defaults: [sub/base]\n").robot == os.path.abspath("robots/mine.yaml")
+    assert load(GOOD, "robot=./mine.yaml").robot == os.path.abspath("mine.yaml")
+
+
+def test_where_gives_the_line_of_a_key_of_its_section_or_its_override():
+    write("base.yaml", GOOD)
+    config = load("# first\ndefaults: [base]\nlimits:\n  rate: 0.1\n", "seed=3", "task.goal_deg.1=7")
+    assert config.where("task.start_deg") == "base.yaml:4: task.start_deg"
+    assert config.where("task.goal_deg.0") == "base.yaml:5: task.goal_deg.0"
+    assert config.where("task.goal_deg.1") == "override 'task.goal_deg.1=7': task.goal_deg.1"
+    assert config.where("limits.rate") == "x.yaml:4: limits.rate"
+    assert config.where("limits.acceleration") == "x.yaml:3: limits.acceleration"
+    assert config.where("task.end_effector") == "base.yaml:3: task.end_effector"
+    assert config.where("seed") == "override 'seed=3': seed"
+    assert config.where("precision") == "x.yaml:2: precision"
+
+
+# --- the shipped scenarios, and writing back ---
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_configurations_load_by_name_and_reload_as_equals(path):
+    config = load_config(path.stem)
+    assert config == load_config(path) and config.name == path.stem
+    again = load_config(write("run/config.yaml", dump_config(config)))
+    assert again == config and dump_config(again) == dump_config(config)
+
+
+def test_the_five_scenarios_are_shipped():
+    names = ["composite_7dof", "composite_wu6", "composite_wu6_impossible"]
+    assert [path.stem for path in SHIPPED] == [*names, "composite_wu6_momentum", "composite_wu6_tight"]
+
+
+def test_names_under_configs_are_found(folder):
+    write("configs/planning/mine.yaml", GOOD)
+    write("configs/other/twice.yaml", GOOD)
+    write("configs/planning/twice.yaml", GOOD)
+    assert load_config("mine").name == "mine"
+    assert (
+        load_config("planning/mine")
+        == load_config("planning/mine.yaml")
+        == load_config("configs/planning/mine")
+    )
+    with pytest.raises(InputError) as caught:
+        load_config("twice")
+    paths = "configs/other/twice.yaml or configs/planning/twice.yaml"
+    assert str(caught.value) == f"'twice' is the name of several configurations, give one of {paths}"
+
+
+def test_an_unusual_configuration_round_trips():
+    extra = """\
+  base_quaternion: [0.7072, 0.7072, 0.0, 1e-5]
+  end_effector: "no"
+limits: {position: [[-1, 2], [0.1, 0.3]], rate_deg: [1, 2], base_excursion: [0.1, 0.2, 0.30000000000000004]}
+objective: {attitude_change: {scale: 0.002}, terms: [{call: a.b, weight: 0.1}, {call: a.c}]}
+optimizer: {kind: qpso, target: 0}
+name: "12"
+"""
+    config = load(GOOD.replace("30", "{min: 10, max: 40}") + extra)
+    again = load_config(write("config.yaml", dump_config(config)))
+    assert again == config and isinstance(again, PlanningConfig)
+    assert again != load(GOOD)
+
+
+def test_the_written_form_is_readable_and_complete():
+    text = dump_config(load(GOOD))
+    assert "  start_deg: [0.0, 90.0]\n" in text and "start:" not in text
+    assert "  scale_deg: 0.1\n" in text.replace("    ", "  ")
+    assert "seed: 0\n" in text and "learning_rate: 0.05\n" in text
+
+
+def test_importing_the_configuration_imports_no_heavy_package():
+    code = (
+        "import sys, jffsr.study.config\n"
+        "sys.exit(sum(m in sys.modules for m in 'jax numpy matplotlib xarray mujoco omegaconf'.split()))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
