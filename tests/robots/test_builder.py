@@ -62,10 +62,6 @@ def _append(key, item):
     return lambda record: record[key].append(item)
 
 
-def _no_joints(record):
-    record.update(links=[], joints=[], end_effectors=[])
-
-
 UPPER = ("links", 0)
 ELBOW = ("joints", 1)
 REFUSED = {
@@ -177,7 +173,6 @@ REFUSED = {
         _append("links", _link("debris")),
         "link 'debris' is an orphan: no joint connects it to the root 'base'",
     ),
-    "no joint": (_no_joints, "the robot has no revolute or prismatic joint"),
     "only fixed joints": (
         lambda record: [joint.update(type="fixed") for joint in record["joints"]],
         "the robot has no revolute or prismatic joint",

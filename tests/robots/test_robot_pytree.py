@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+
 import chex
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jffsr.robots.builder import build_robot
+from jffsr.robots.loading import describe_robot
 from jffsr.robots.state import State
 from jffsr.rollouts.rollout import rollout
 from jffsr.trajectories.sine_polynomial import SinePolynomial
 
+TWO_ARMS = Path(__file__).parents[1] / "data" / "robots" / "two_arms.yaml"
 FIELDS = ("mass", "inertia", "link_com", "joint_position", "joint_axis", "joint_rotation")
 
 
@@ -27,9 +33,19 @@ def _loss(robot):
 
 
 @pytest.fixture(scope="module")
-def compiled(robots):
-    """Robot, value function that counts its traces, and gradient."""
-    robot = jax.tree.map(jnp.asarray, robots["two_arms"])
+def compiled():
+    """Robot, value function that counts its traces, and gradient.
+
+    The robot is the first arm of two_arms without its hand: one joint of each type, both in tilted frames.
+    """
+    whole = describe_robot(TWO_ARMS)
+    arm = dataclasses.replace(
+        whole,
+        links=tuple(link for link in whole.links if link.name in ("base", "left_upper", "left_slide")),
+        joints=tuple(joint for joint in whole.joints if joint.name in ("left_shoulder", "left_extend")),
+        end_effectors=(),
+    )
+    robot = jax.tree.map(jnp.asarray, build_robot(arm))
     chex.clear_trace_counter()
     return robot, jax.jit(chex.assert_max_traces(_loss, n=1)), jax.jit(jax.grad(_loss))(robot)
 
@@ -71,14 +87,3 @@ def test_topology_is_static_and_decides_equality_of_structure(robots):
     left, right = robots["wu_2018_6dof"], robots["servicer_7dof"]
     assert jax.tree.structure(left) != jax.tree.structure(right)
     assert hash(left.topology) == hash(left.replace(mass=2 * left.mass).topology)
-
-
-def test_a_batch_of_robots(compiled):
-    """vmap over robots that differ in their numbers is a loop over them."""
-    robot, value, _ = compiled
-    scales = np.array([1.0, 1.3])
-    batch = robot.replace(mass=scales[:, None] * robot.mass)
-    axes = jax.tree.map(lambda _: None, robot).replace(mass=0)
-    together = jax.jit(jax.vmap(_loss, in_axes=(axes,)))(batch)
-    alone = [value(robot.replace(mass=s * robot.mass)) for s in scales]
-    np.testing.assert_allclose(together, alone, rtol=1e-13)

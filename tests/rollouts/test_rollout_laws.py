@@ -15,7 +15,6 @@ from jffsr.robots.state import State
 from jffsr.rollouts.reference import reference_rollout
 from jffsr.rollouts.rollout import check_steps, rollout
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply
-from jffsr.trajectories.sine_polynomial import SinePolynomial
 
 MOMENTUM = np.array([1.0, -2.0, 0.5, 3.0, 2.0, -4.0])
 START_ATTITUDE = np.array([0.8, 0.2, -0.4, 0.4])
@@ -85,15 +84,14 @@ def test_attitude_converges_with_order_four(robots):
     state = State(np.zeros(3), START_ATTITUDE, np.zeros(2))
     momentum = np.array([5.0, 0, -3, 30.0, -40.0, 60.0])
 
-    def final(path, steps):
-        motion = jax.jit(lambda t: path(robot, t, state, num_steps=steps, momentum=momentum))(trajectory)
+    def final(steps):
+        motion = jax.jit(lambda t: rollout(robot, t, state, num_steps=steps, momentum=momentum))(trajectory)
         return motion.base_quaternion[-1]
 
-    exact = final(rollout, 1600)
-    for path in (rollout, reference_rollout):
-        coarse, fine = (np.linalg.norm(final(path, steps) - exact) for steps in (20, 40))
-        assert fine > 1e-10, "too accurate to see an order"
-        np.testing.assert_allclose(np.log2(coarse / fine), 4.0, atol=0.1)
+    coarse, fine, exact = (final(steps) for steps in (20, 40, 1600))
+    errors = np.linalg.norm(coarse - exact), np.linalg.norm(fine - exact)
+    assert errors[1] > 1e-10, "too accurate to see an order"
+    np.testing.assert_allclose(np.log2(errors[0] / errors[1]), 4.0, atol=0.1)
 
 
 def test_duration_and_steps_are_checked(robots):
@@ -108,21 +106,28 @@ def test_duration_and_steps_are_checked(robots):
 
 
 def test_a_plain_callable_is_a_trajectory(robots):
-    """A user's own function of time, with the duration given, moves the robot as the package's law does."""
+    """A user's own function of time needs nothing but the duration."""
     robot = robots["hu_2011_planar2"]
-    law = SinePolynomial.between([0.1, 0.2], [0.5, -0.4], [-2, -2], [2, 2], 5.0)
     state = State(np.zeros(3), START_ATTITUDE, np.zeros(2))
-    ours = jax.jit(lambda: rollout(robot, law, state, num_steps=4))()
-    theirs = jax.jit(lambda: rollout(robot, lambda t: law(t), state, duration=5.0, num_steps=4))()
-    chex.assert_trees_all_close(ours, theirs, rtol=0, atol=1e-15)
+
+    def swing(time):
+        q = jnp.array([0.1, 0.2])
+        return q * jnp.sin(time), q * jnp.cos(time), -q * jnp.sin(time)
+
+    motion = jax.jit(lambda d: rollout(robot, swing, state, duration=d, num_steps=4))(5.0)
+    np.testing.assert_allclose(motion.time, np.linspace(0, 5, 5), rtol=1e-15)
+    np.testing.assert_allclose(motion.joint_position[:, 1], 0.2 * np.sin(motion.time), rtol=1e-14)
+    np.testing.assert_array_equal(motion.momentum, np.zeros(6))
 
 
-def test_no_momentum_is_zero_momentum_and_vmap_is_a_loop(robots):
+def test_vmap_over_robots_and_momenta_is_a_loop(robots):
     robot = robots["hu_2011_planar2"]
     trajectory, state = _setting(robot)
-    batch = jnp.stack([jnp.zeros(6), MOMENTUM])
-    together = jax.jit(jax.vmap(lambda m: rollout(robot, trajectory, state, num_steps=4, momentum=m)))(batch)
-    none = jax.jit(lambda: rollout(robot, trajectory, state, num_steps=4))()
-    alone = jax.jit(lambda m: rollout(robot, trajectory, state, num_steps=4, momentum=m))(MOMENTUM)
-    chex.assert_trees_all_close(jax.tree.map(lambda x: x[0], together), none, rtol=0, atol=1e-14)
-    chex.assert_trees_all_close(jax.tree.map(lambda x: x[1], together), alone, rtol=0, atol=1e-14)
+
+    def run(mass, momentum):
+        return rollout(robot.replace(mass=mass), trajectory, state, num_steps=4, momentum=momentum)
+
+    batch = np.stack([robot.mass, 1.3 * robot.mass]), np.stack([np.zeros(6), MOMENTUM])
+    together = jax.jit(jax.vmap(run))(*batch)
+    alone = jax.tree.map(lambda *x: jnp.stack(x), *map(jax.jit(run), *batch))
+    chex.assert_trees_all_close(together, alone, rtol=0, atol=1e-14)
