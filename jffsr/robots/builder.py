@@ -64,8 +64,8 @@ def _check_joint(where: str, joint: JointDescription) -> None:
     for what, value in (("position", joint.position), ("rotation", joint.rotation), ("axis", joint.axis)):
         if not np.all(np.isfinite(value)):
             raise InputError(f"{body}: {what} {np.asarray(value).tolist()} is not finite")
-    if not np.allclose(joint.rotation @ joint.rotation.T, np.eye(3), atol=1e-9):
-        raise InputError(f"{body}: rotation is not orthogonal")
+    if not _is_rotation(joint.rotation):
+        raise InputError(f"{body}: rotation is not a rotation matrix")
     if joint.type != FIXED and np.linalg.norm(joint.axis) < 1e-12:
         raise InputError(f"{body}: axis {joint.axis.tolist()} has length zero")
     low, high = joint.position_limit
@@ -77,6 +77,10 @@ def _check_joint(where: str, joint: JointDescription) -> None:
         value = getattr(joint, what)
         if not value > 0:
             raise InputError(f"{body}: {what.replace('_', ' ')} is {value:g}; it must be positive")
+
+
+def _is_rotation(matrix: np.ndarray) -> bool:
+    return np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-9) and bool(np.linalg.det(matrix) > 0)
 
 
 def _check_names(description: RobotDescription) -> None:
@@ -100,6 +104,8 @@ def _check_names(description: RobotDescription) -> None:
             raise InputError(f"{where}: end effector '{tool.name}': link '{tool.link}' does not exist")
         if not np.all(np.isfinite(tool.position)) or not np.all(np.isfinite(tool.rotation)):
             raise InputError(f"{where}: end effector '{tool.name}': its pose is not finite")
+        if not _is_rotation(tool.rotation):
+            raise InputError(f"{where}: end effector '{tool.name}': rotation is not a rotation matrix")
 
 
 def _tree_order(description: RobotDescription) -> list[JointDescription]:

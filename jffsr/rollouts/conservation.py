@@ -85,12 +85,12 @@ def _body_momenta(robot: Robot, motion: Motion) -> tuple[Array, Array, tuple[Sca
     lever = com[inner] - centre[inner, None]
     angular = jnp.einsum("kbij,kbj->kbi", inertia[inner], rate) + jnp.cross(lever, linear)
 
-    # Rounding of the poses over one step, times the factor that leaves half of the digits.
+    # What a rounding of the poses looks like as momentum, times the factor that leaves half of the digits.
     blur = jnp.sqrt(jnp.finfo(com.dtype).eps) / step
-    size = jnp.max(jnp.linalg.norm(com, axis=-1)) + jnp.max(jnp.linalg.norm(lever, axis=-1))
-    linear_resolution = jnp.sum(mass) * size * blur
-    angular_resolution = linear_resolution * size + jnp.sum(jnp.trace(inertia[0], axis1=-2, axis2=-1)) * blur
-    return linear, angular, (linear_resolution, angular_resolution)
+    linear_blur = mass * jnp.max(jnp.linalg.norm(com, axis=-1), axis=0) * blur
+    spin_blur = jnp.trace(inertia[0], axis1=-2, axis2=-1) * blur
+    arm = jnp.max(jnp.linalg.norm(lever, axis=-1), axis=0)
+    return linear, angular, (jnp.sum(linear_blur), jnp.sum(arm * linear_blur + spin_blur))
 
 
 def _difference(x: Array, step: Scalar) -> Array:

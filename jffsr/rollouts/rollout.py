@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import jax
 import jax.numpy as jnp
 
@@ -54,9 +56,10 @@ def check_duration(trajectory: Trajectory, duration: Scalar | float | None) -> S
 
 def check_steps(num_steps: int) -> int:
     """The number of steps, if it is a positive whole number."""
-    if not isinstance(num_steps, int) or isinstance(num_steps, bool) or num_steps < 1:
+    # numpy's integers are not Python's, but both register as Integral; so does bool.
+    if not isinstance(num_steps, Integral) or isinstance(num_steps, bool) or num_steps < 1:
         raise InputError(f"num_steps is {num_steps!r}; a positive whole number is expected")
-    return num_steps
+    return int(num_steps)
 
 
 def rollout_grid(

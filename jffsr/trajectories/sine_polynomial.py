@@ -64,9 +64,10 @@ class SinePolynomial:
         """A checked trajectory from host numbers; coefficients are zero unless given."""
         start, goal, lower, upper = (np.array(x, dtype=float) for x in (start, goal, lower, upper))
         names = joint_names or [f"joint {i}" for i in range(start.size)]
-        for what, value in (("start", start), ("goal", goal)):
+        for what, value in (("start", start), ("goal", goal), ("upper limit", upper)):
             if value.shape != lower.shape:
                 raise InputError(f"{what} has {value.size} numbers; the robot has {lower.size} joints")
+        for what, value in (("start", start), ("goal", goal)):
             for name, x, low, high in zip(names, value, lower, upper, strict=True):
                 if not (np.isfinite(low) and np.isfinite(high)):
                     raise InputError(
@@ -80,6 +81,17 @@ class SinePolynomial:
                     )
         if not (np.isfinite(duration) and duration > 0):
             raise InputError(f"duration is {duration:g} s; it must be positive and finite")
+        if duration_bounds is not None:
+            shortest, longest = duration_bounds
+            if not 0 < shortest < longest < np.inf:
+                raise InputError(
+                    f"duration bounds are [{shortest:g}, {longest:g}] s; "
+                    f"they must be positive, finite and in order"
+                )
+        if coefficients is not None and jnp.shape(coefficients) != (start.size, 2):
+            raise InputError(
+                f"coefficients have the shape {jnp.shape(coefficients)}; ({start.size}, 2) is expected"
+            )
         return cls(
             start=start,
             goal=goal,

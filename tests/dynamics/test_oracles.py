@@ -35,7 +35,7 @@ def _cases(data: dict) -> list[dict]:
 
 
 def _inputs(cases: list[dict]) -> dict[str, np.ndarray]:
-    """Inputs stacked over the cases; the given angular momentum moved from the origin to the system's centre."""
+    """Inputs stacked over the cases; the given angular momentum is moved to the system's centre."""
     read = {key: np.array([c["inputs"][key] for c in cases]) for key in cases[0]["inputs"]}
     com = np.array([c["outputs"]["system_com"] for c in cases])
     about_com = read["given_L_origin"] - np.cross(com, read["given_P"])
