@@ -1,0 +1,1 @@
+"""The same motion in MuJoCo and MJX, as independent witnesses."""
