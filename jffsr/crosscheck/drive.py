@@ -126,15 +126,20 @@ def joint_torque(xp: ModuleType, inertia: Any, bias: Any, joint_acceleration: An
     return inertia[b:, :b] @ base + inertia[b:, b:] @ joint_acceleration + bias[b:]
 
 
-def largest_shares(mass, principal, com, axes, velocity, system_com) -> np.ndarray:
-    """Largest |P| and |L| (about the system centre of mass) of any one body, (2,), from engine data.
+def body_momenta(mass, principal, com, axes, velocity, system_com) -> tuple[np.ndarray, np.ndarray]:
+    """Linear and angular momentum (about the system centre of mass) of each body, (..., b, 3) each.
 
-    Per body b, leading axes any: mass (b,), principal moments (b, 3), com (..., b, 3), principal axes
-    (..., b, 3, 3), velocity (..., b, 6) as MuJoCo's cvel, [angular; linear at the system centre of mass],
-    system_com (..., 3).
+    The arguments are an engine's data: mass (b,), principal moments (b, 3), centres of mass (..., b, 3),
+    principal axes (..., b, 3, 3), velocity (..., b, 6) as MuJoCo's cvel, [angular; linear, of the body point
+    at the system centre of mass], system_com (..., 3).
     """
     spin, lever = velocity[..., :3], com - system_com[..., None, :]
     linear = mass[:, None] * (velocity[..., 3:] + np.cross(spin, lever))
-    own = np.einsum("...ij,...j,...kj,...k->...i", axes, principal, axes, spin)
-    angular = own + np.cross(lever, linear)
+    spin_in_axes = np.einsum("...ji,...j->...i", axes, spin)
+    own = np.einsum("...ij,...j->...i", axes, principal * spin_in_axes)
+    return linear, own + np.cross(lever, linear)
+
+
+def largest_shares(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
+    """Largest magnitudes (2,) of any one body's linear and angular momentum."""
     return np.array([np.linalg.norm(x, axis=-1).max() for x in (linear, angular)])

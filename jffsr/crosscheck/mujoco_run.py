@@ -6,7 +6,14 @@ import time
 
 import numpy as np
 
-from jffsr.crosscheck.drive import Drive, EngineMotion, commanded_acceleration, joint_torque, largest_shares
+from jffsr.crosscheck.drive import (
+    Drive,
+    EngineMotion,
+    body_momenta,
+    commanded_acceleration,
+    joint_torque,
+    largest_shares,
+)
 from jffsr.crosscheck.mujoco_model import BASE_COORDINATES, BASE_VELOCITIES, to_mjmodel
 from jffsr.robots.robot import Robot
 
@@ -51,20 +58,15 @@ def run_mujoco(robot: Robot, drive: Drive) -> EngineMotion:
 
     poses = np.array(poses)
     com, axes, velocity, system_com = (np.array(x) for x in zip(*states, strict=True))
+    axes = axes.reshape(*axes.shape[:2], 3, 3)
+    bodies = model.body_mass[1:], model.body_inertia[1:]
     return EngineMotion(
         time=drive.time,
         base_position=poses[:, :3],
         base_quaternion=poses[:, 3:BASE_COORDINATES],
         joint_position=poses[:, BASE_COORDINATES:],
         momentum=np.array(momenta),
-        momentum_share=largest_shares(
-            model.body_mass[1:],
-            model.body_inertia[1:],
-            com,
-            axes.reshape(*axes.shape[:2], 3, 3),
-            velocity,
-            system_com,
-        ),
+        momentum_share=largest_shares(*body_momenta(*bodies, com, axes, velocity, system_com)),
         tracking_error=float(error),
         compile_seconds=0.0,
         run_seconds=seconds,
