@@ -112,7 +112,9 @@ def make_drive(
 
 
 def commanded_acceleration(step: Any, mean_acceleration: Any, position_error: Any, rate_error: Any) -> Any:
-    """Joint acceleration (n,) to command over a step, from the errors (reference less actual) at its start."""
+    """Joint acceleration (n,) to command over a step, from the errors (reference less actual) at its
+    start.
+    """
     return mean_acceleration + position_error / step**2 + 1.5 * rate_error / step
 
 

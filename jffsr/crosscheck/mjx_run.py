@@ -45,7 +45,9 @@ def run_mjx(robot: Robot, drives: Sequence[Drive]) -> list[EngineMotion]:
         blank = mjx.make_data(model, impl="jax")
         follow = jax.jit(lambda *arguments: _follow(mjx_model, blank, *arguments))
         # A map compiles in two thirds of the time of a vmap, and a hundred samples take no time.
-        measure = jax.jit(lambda states: jax.lax.map(lambda state: _measure(mjx_model, blank, *state), states))
+        measure = jax.jit(
+            lambda states: jax.lax.map(lambda state: _measure(mjx_model, blank, *state), states)
+        )
         widest = max(drive.substeps for drive in drives)
         motions = []
         for drive in drives:
@@ -70,9 +72,7 @@ def run_mjx(robot: Robot, drives: Sequence[Drive]) -> list[EngineMotion]:
                     joint_position=qpos[:, BASE_COORDINATES:],
                     momentum=np.concatenate([linear.sum(axis=1), angular.sum(axis=1)], axis=-1),
                     momentum_share=largest_shares(linear, angular),
-                    tracking_error=float(
-                        np.maximum(error, np.abs(drive.joint_position[-1] - last).max())
-                    ),
+                    tracking_error=float(np.maximum(error, np.abs(drive.joint_position[-1] - last).max())),
                     compile_seconds=0.0 if motions else compiled - start,
                     run_seconds=done - compiled,
                 )

@@ -33,7 +33,8 @@ def run_mujoco(robot: Robot, drive: Drive) -> EngineMotion:
         linear = model.body_subtreemass[1] * data.subtree_linvel[1]
         momenta.append(np.concatenate([linear, data.subtree_angmom[1]]))
         poses.append(data.qpos.copy())
-        states.append([x.copy() for x in (data.xipos[1:], data.ximat[1:], data.cvel[1:], data.subtree_com[1])])
+        read = data.xipos[1:], data.ximat[1:], data.cvel[1:], data.subtree_com[1]
+        states.append([x.copy() for x in read])
 
     start = time.perf_counter()
     total = len(drive.mean_acceleration)
