@@ -114,9 +114,12 @@ def _fine_motion(
     robot: Robot, trajectory: Trajectory, initial_state: State, duration: float, momentum: np.ndarray
 ) -> Motion:
     per_sample = max(1, int(np.ceil(duration / _SAMPLES / _REFERENCE_STEP)))
-    motion = reference_rollout(
-        robot, trajectory, initial_state, duration, num_steps=_SAMPLES * per_sample, momentum=momentum
-    )
+    # Compiled as a whole: operation by operation, JAX would compile every one of them.
+    motion = jax.jit(
+        lambda robot, start, momentum: reference_rollout(
+            robot, trajectory, start, duration, _SAMPLES * per_sample, momentum
+        )
+    )(robot, initial_state, momentum)
     samples = {
         name: getattr(motion, name)[::per_sample]
         for name in (

@@ -91,12 +91,13 @@ def make_drive(
     substeps = max(1, int(np.ceil(duration / intervals / largest_step * (1 - 1e-9))))
     steps = intervals * substeps
     step = duration / steps
-    q, qd, _ = jax.vmap(trajectory)(jnp.linspace(0.0, duration, steps + 1))
+    # Compiled as a whole: operation by operation, JAX would compile every one of them.
+    q, qd, _ = jax.jit(jax.vmap(lambda t: trajectory(t)))(jnp.linspace(0.0, duration, steps + 1))
     q, qd = np.array(q, dtype=float), np.array(qd, dtype=float)
     position = np.array(initial_state.base_position, dtype=float)
     quaternion = np.array(initial_state.base_quaternion, dtype=float)
     start = State(base_position=position, base_quaternion=quaternion, joint_position=q[0])
-    twist = np.asarray(base_twist(robot, kinematics(robot, start), qd[0], momentum))
+    twist = np.asarray(_initial_twist(robot, start, qd[0], momentum))
     # A free joint's linear velocity is resolved in I, its angular velocity in B.
     spin_B = np.asarray(quaternion_to_matrix(jnp.asarray(quaternion))).T @ twist[3:]
     return Drive(
@@ -109,6 +110,11 @@ def make_drive(
         qpos=np.concatenate([position, quaternion, q[0]]),
         qvel=np.concatenate([twist[:3], spin_B, qd[0]]),
     )
+
+
+@jax.jit
+def _initial_twist(robot: Robot, start: State, joint_velocity, momentum):
+    return base_twist(robot, kinematics(robot, start), joint_velocity, momentum)
 
 
 def commanded_acceleration(step: Any, mean_acceleration: Any, position_error: Any, rate_error: Any) -> Any:

@@ -94,7 +94,7 @@ class CrosscheckReport:
             for what in ("attitude", "position"):
                 fine, coarse = getattr(last, what), getattr(first, what)
                 small = fine <= _FLOOR * getattr(self.tolerances, what)
-                if first is not last and not (small or fine < coarse):
+                if not reasons and first is not last and not (small or fine < coarse):
                     reasons.append(f"the {what} difference does not shrink with the step")
             if reasons:
                 title = ENGINE_TITLES[engine]

@@ -18,11 +18,13 @@ from jffsr.errors import InputError
 MOMENTUM = np.array([1.0, -2.0, 0.5, 0.8, -0.6, 1.1])
 
 
-@pytest.mark.parametrize("momentum", [None, MOMENTUM], ids=["zero", "given"])
-def test_mujoco_agrees_and_converges(tree, tree_trajectory, tumbled, momentum):
-    report = crosscheck(
-        tree, tree_trajectory, tumbled, momentum=momentum, steps=(4e-3, 2e-3, 1e-3), engines=["mujoco"]
-    )
+@jax.jit
+def rollout(robot, trajectory, state, momentum):
+    return jffsr.rollout(robot, trajectory, state, num_steps=150, momentum=momentum)
+
+
+def test_mujoco_agrees_and_converges(tree, tree_trajectory, tumbled):
+    report = crosscheck(tree, tree_trajectory, tumbled, steps=(4e-3, 2e-3, 1e-3), engines=["mujoco"])
     assert report.passed, report.sentence
     assert report.shrinks("mujoco")
     attitude = [entry.attitude for entry in report.comparisons]
@@ -42,6 +44,7 @@ def test_mjx_agrees_with_mujoco(tree, tree_trajectory, tumbled):
     report = crosscheck(tree, tree_trajectory, tumbled, momentum=MOMENTUM, steps=(1e-2, 5e-3))
     assert report.passed, report.sentence
     assert report.shrinks("mjx")
+    assert report.shrinks("mujoco")
     mjx, mujoco = report.of_engine("mjx"), report.of_engine("mujoco")
     assert [entry.step for entry in mjx] == pytest.approx([1e-2, 5e-3])
     for theirs, other in zip(mjx, mujoco, strict=True):
@@ -58,16 +61,15 @@ def test_mjx_agrees_with_mujoco(tree, tree_trajectory, tumbled):
 def test_wrong_mass_fails(tree, tree_trajectory, tumbled):
     mass = tree.mass.copy()
     mass[3] *= 1.01
-    motion = jffsr.rollout(tree.replace(mass=mass), tree_trajectory, tumbled, num_steps=100)
+    motion = rollout(tree.replace(mass=mass), tree_trajectory, tumbled, np.zeros(6))
     report = crosscheck(tree, tree_trajectory, tumbled, reference=motion, engines=["mujoco"])
     assert not report.passed
-    assert report.sentence.startswith(
-        "The cross-check failed: in MuJoCo with 1 ms steps base attitude differs by"
-    )
+    assert report.sentence.startswith("The cross-check failed: in MuJoCo with ")
+    assert "base attitude differs by" in report.sentence
 
 
 def test_given_motion_is_compared_at_its_own_samples(tree, tree_trajectory, tumbled):
-    motion = jffsr.rollout(tree, tree_trajectory, tumbled, num_steps=150, momentum=MOMENTUM)
+    motion = rollout(tree, tree_trajectory, tumbled, MOMENTUM)
     report = crosscheck(tree, tree_trajectory, tumbled, reference=motion, engines="mujoco", steps=[2e-3])
     assert report.passed, report.sentence
     assert report.momentum == pytest.approx(tuple(MOMENTUM))
