@@ -6,8 +6,8 @@ of steps per sample are traced, not static, and the warm-up that compiles takes 
 step are called one by one: the torque needs positions and velocities, which mjx.step would do again. Only
 configuration and velocity travel in the loop; everything else is made from them within a step.
 
-MJX takes an angular velocity whose components are all under 1e-8 rad/s for zero, so a slow start or end leaves
-about 1e-10 rad in the attitude that no shorter step removes.
+MJX takes an angular velocity whose components are all under 1e-8 rad/s for zero, so a slow start or end
+leaves about 1e-10 rad in the attitude that no shorter step removes.
 """
 
 from __future__ import annotations
