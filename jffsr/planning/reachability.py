@@ -31,7 +31,7 @@ def check_duration_possible(
     if not np.any(least > duration):
         return
     sentences = []
-    for i in np.flatnonzero(least > duration):
+    for i in np.flatnonzero(least >= 0.999 * least.max()):
         unit, turn = (
             ("m", goal[i] - start[i]) if _slides(robot, i) else ("deg", np.rad2deg(goal[i] - start[i]))
         )
