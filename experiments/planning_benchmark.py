@@ -58,7 +58,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--scenarios", default=",".join(SCENARIOS), help="names, by commas")
     parser.add_argument("--starts", type=int, default=8, help="starts of the gradient alone")
-    parser.add_argument("--evaluations", type=int, default=SWARM.evaluations, help="the swarm alone: its budget")
+    parser.add_argument("--evaluations", type=int, default=SWARM.evaluations, help="of the swarm alone")
     parser.add_argument("--out", default="docs/benchmarks/planning.md")
     parser.add_argument("--redraw", action="store_true", help="from the runs kept beside --out")
     return parser.parse_args()
