@@ -111,7 +111,7 @@ def _row(name: str, method: str, seed: int, ratio: float, outcome: Outcome) -> d
     if name == SCENARIOS[0]:
         # The best so far, on a grid that all runs share; null before the first evaluation is in.
         last = np.searchsorted(charged, CURVE_GRID, side="right") - 1
-        row["curve"] = [float(f"{best[i]:.4g}") if np.isfinite(best[i]) else None for i in last]
+        row["curve"] = [float(f"{best[i]:.4g}") if i >= 0 and np.isfinite(best[i]) else None for i in last]
     return row
 
 
