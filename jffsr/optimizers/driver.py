@@ -118,7 +118,8 @@ def run(
 ) -> Outcome:
     """Run the phases one after another and return the best point found.
 
-    `on_chunk` sees a snapshot after every chunk, from which `resume` goes on to the same bits. `interrupted` is asked between chunks.
+    `on_chunk` sees a snapshot after every chunk, from which `resume` goes on to the same bits.
+    `interrupted` is asked between chunks.
     """
     if not phases:
         raise InputError("there is no phase to run")
@@ -130,7 +131,7 @@ def run(
         before = _evaluations_before(history, index)
         if state is None:
             state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
-        while not bool(phase.stop.reached(state.progress)):
+        while not phase.stop.reached(jax.device_get(state.progress)):
             if interrupted():
                 return _outcome(phase, state, history, "interrupted")
             last = int(state.progress.iteration)
