@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -49,6 +50,24 @@ class Plan:
         """The first record of the history whose best value is at most `value`."""
         return next((record for record in self.history if record.best_value <= value), None)
 
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion as CSV; see `jffsr.planning.export.to_csv`."""
+        from jffsr.planning.export import to_csv
+
+        to_csv(self, path)
+
+    def to_mat(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion for MATLAB or Octave; see `jffsr.planning.export.to_mat`."""
+        from jffsr.planning.export import to_mat
+
+        to_mat(self, path)
+
+    def joint_table(self, period: float) -> dict[str, np.ndarray]:
+        """Joint motion every `period` s; see `jffsr.planning.export.joint_table`."""
+        from jffsr.planning.export import joint_table
+
+        return joint_table(self, period)
+
 
 class SearchInterrupted(Exception):
     """A search was stopped from outside before its end; `outcome` is what it had found."""
@@ -86,7 +105,7 @@ def solve(
     """
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
-    _check_precision(precision)
+    check_precision(precision)
     with Stopwatch() as watch:
         outcome = run(
             build_phases(optimizer, settings),
@@ -132,7 +151,8 @@ def _at_its_end(outcome: Outcome) -> bool:
     return bool(np.isfinite(earlier) and earlier - values[-1] <= 0.01 * abs(earlier))
 
 
-def _check_precision(precision: str) -> None:
+def check_precision(precision: str) -> None:
+    """Refuse to plan in float64 while JAX's 64-bit floats are off."""
     if precision == "float64" and not jax.config.jax_enable_x64:
         raise InputError(
             "planning needs float64: call jax.config.update('jax_enable_x64', True) first "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 SMALL = (
@@ -19,6 +21,17 @@ SMALL = (
     "output.figures=false",
     "output.progress=false",
 )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compilation_cache(tmp_path_factory):
+    """The command line keeps compiled programs: here in a folder of the tests', shared by their workers."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JFFSR_CACHE_DIR", str(folder / "xla"))
+        yield
 
 
 @pytest.fixture(scope="session")
