@@ -88,7 +88,13 @@ class Outcome:
 
 @jax.jit
 def _init(optimizer, problem, key, population):
-    return optimizer.init(key, problem, population)
+    # A step gives back strongly typed numbers: a weakly typed start would compile the first chunk on its own.
+    return jax.tree.map(_strongly_typed, optimizer.init(key, problem, population))
+
+
+def _strongly_typed(x: Array) -> Array:
+    is_key = jax.dtypes.issubdtype(x.dtype, jax.dtypes.prng_key)
+    return x if is_key else jax.lax.convert_element_type(x, x.dtype)
 
 
 def _advance(optimizer, problem, state, stop, length):
