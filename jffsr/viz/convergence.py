@@ -8,113 +8,102 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from jffsr.viz.style import COLOURS, GREY, SHADE, WIDTH, new_figure, styled
+from jffsr.viz.style import GREY, SHADE, legend_above, line_look, new_figure, styled
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+
+# How far below the accuracy the axis goes: what lies deeper matters to nobody and would flatten the rest.
+_DEPTH = 1e-4
 
 
 @styled
 def draw_convergence(dataset: Dataset) -> Figure:
     """Best J of a run against its evaluations, on a logarithmic scale, with its phases and the accuracy.
 
-    dataset is a run's result.nc. A gradient evaluation counts as one evaluation more, in addition to the
-    objective evaluation it came with; the charge of each phase stands under its name. Before the first finite
-    J nothing is drawn.
+    dataset is a run's result.nc. The horizontal axis charges one for an objective evaluation and one for a
+    gradient (its value included); the legend has each phase's bill. Nothing is drawn before the first
+    finite J. The axis ends four decades under the accuracy; an end further down is a triangle at its foot.
     """
     objective = dataset["history_evaluations"].values.astype(float)
     gradient = dataset["history_gradient_evaluations"].values.astype(float)
-    spent = objective + gradient
+    phases = dataset["history_phase"].values
     best = np.asarray(dataset["history_best_value"].values, float)
+    best = np.where(np.isfinite(best), best, np.nan)
     accuracy = float(dataset.attrs["accuracy"])
+    names = json.loads(dataset.attrs["phase_names"])
 
     figure = new_figure(2.3)
     axes = figure.subplots()
-    shown = _on_log_scale(best, accuracy)
-    # A value holds from the evaluation that found it until a better one is found.
-    axes.step(spent, shown, where="post", color=COLOURS[1])
-    if np.isfinite(shown).any():
-        axes.plot(spent[-1:], shown[-1:], "o", color=COLOURS[1], markersize=3, clip_on=False)
+    floor, ceiling = _range(best, accuracy)
+    handles, labels, spent = [], [], objective + gradient
+    for order, phase in enumerate(np.unique(phases)):
+        inside = np.flatnonzero(phases == phase)
+        before = inside[0] - 1
+        look = line_look(order)
+        handles.append(Line2D([], [], **look))
+        labels.append(
+            f"{names[phase] if phase < len(names) else f'phase {phase + 1}'}: "
+            + _bill(objective, before, inside[-1], gradient)
+        )
+        left = spent[before] if before >= 0 else 0.0
+        if before >= 0:
+            axes.axvline(left, color=GREY, linewidth=0.6, linestyle=":", gid="phase")
+        if order % 2:
+            axes.axvspan(left, spent[inside[-1]], color=SHADE, linewidth=0, zorder=0)
+        # A value holds from the evaluation that found it until a better one is, also in the next phase.
+        rows = np.arange(max(before, 0), inside[-1] + 1)
+        axes.step(spent[rows], np.maximum(best[rows], 0.1 * floor), where="post", **look)
+    if np.isfinite(best).any():
+        end = best[-1]
+        mark = {"color": handles[-1].get_color(), "marker": "o" if end >= floor else "v", "markersize": 4}
+        axes.plot(spent[-1], max(end, floor), linestyle="none", clip_on=False, zorder=5, **mark)
+        handles.append(Line2D([], [], linestyle="none", **mark))
+        labels.append(f"end: J = {end:.2g}")
     else:
         axes.text(0.5, 0.5, "no finite J was found", transform=axes.transAxes, ha="center", color=GREY)
-    if accuracy > 0:
-        axes.axhline(accuracy, color=COLOURS[2], linestyle=(0, (4, 2)), linewidth=0.8, gid="accuracy")
-        axes.annotate(
-            f"accuracy J = {accuracy:g}",
-            (0.0, accuracy),
-            xycoords=("axes fraction", "data"),
-            xytext=(3, -2),
-            textcoords="offset points",
-            va="top",
-            fontsize=7,
-            color=COLOURS[2],
-        )
     axes.set_yscale("log")
-    _set_range(axes, shown, accuracy)
+    axes.set_ylim(floor, ceiling)
     axes.set_xlim(0, max(spent[-1] if spent.size else 0.0, 1.0))
-    _mark_phases(axes, dataset, objective, gradient)
+    _mark_accuracy(axes, accuracy)
     axes.set_xlabel("objective + gradient evaluations")
     axes.set_ylabel("best J [-]")
+    if handles:
+        legend_above(figure, handles, labels)
     return figure
 
 
-def _on_log_scale(best: np.ndarray, accuracy: float) -> np.ndarray:
-    """Values to draw: nan for what is not finite, and what is not positive at a tenth of the least positive."""
-    shown = np.where(np.isfinite(best), best, np.nan)
-    positive = [*shown[shown > 0], *([accuracy] if accuracy > 0 else [])]
-    return np.where(shown <= 0, 0.1 * min(positive, default=1.0), shown)
+def _bill(objective: np.ndarray, before: int, last: int, gradient: np.ndarray) -> str:
+    """What a phase spent: its objective evaluations, and its gradients where it took any."""
+    spent = [counts[last] - (counts[before] if before >= 0 else 0.0) for counts in (objective, gradient)]
+    parts = [f"{count:.0f} {unit}" for count, unit in zip(spent, ("J", "∇J"), strict=True) if count > 0]
+    return " + ".join(parts) or "nothing"
 
 
-def _set_range(axes: Axes, shown: np.ndarray, accuracy: float) -> None:
-    marks = [*shown[np.isfinite(shown)], *([accuracy] if accuracy > 0 else [])] or [1.0]
-    low, high = np.log10(min(marks)), np.log10(max(marks))
-    pad = max(0.06 * (high - low), 0.1)
-    # Room under the accuracy line for its own words.
-    axes.set_ylim(10 ** (low - max(pad, 0.16 * (high - low))), 10 ** (high + pad))
+def _range(best: np.ndarray, accuracy: float) -> tuple[float, float]:
+    """Least and greatest J on the axis, with room around the values and the accuracy."""
+    marks = [*best[best > 0], *([accuracy] if accuracy > 0 else [])] or [1.0]
+    low, high = min(marks), max(marks)
+    if accuracy > 0:
+        low = max(low, _DEPTH * accuracy)
+    pad = max((high / low) ** 0.15, 1.5)
+    return low / pad, high * pad**0.5
 
 
-def _mark_phases(axes: Axes, dataset: Dataset, objective: np.ndarray, gradient: np.ndarray) -> None:
-    """Shade every second phase, and write above each its name and what it was charged."""
-    names = json.loads(dataset.attrs["phase_names"])
-    phases = dataset["history_phase"].values
-    before, ends = (0.0, 0.0), []  # `ends`: how far each row of words is filled, in points
-    words_width = 0.82 * 72 * WIDTH  # about the width of the axes, in points
-    scale = words_width / axes.get_xlim()[1]
-    for number in np.unique(phases):
-        last = np.flatnonzero(phases == number)[-1]
-        after = (objective[last], gradient[last])
-        left, right = sum(before), sum(after)
-        if left > 0:
-            axes.axvline(left, color=GREY, linewidth=0.6, linestyle=":", gid="phase")
-        if number % 2:
-            axes.axvspan(left, right, color=SHADE, linewidth=0, zorder=0)
-        name = names[number] if number < len(names) else f"phase {number + 1}"
-        text = f"{name}: {after[0] - before[0]:.0f} J"
-        if after[1] > before[1]:
-            text += f" + {after[1] - before[1]:.0f} ∇J"
-        width = _text_width(axes, text)
-        middle = 0.5 * (left + right)
-        start = min(max(middle * scale - width / 2, 0.0), max(words_width - width, 0.0))
-        row = next((row for row, end in enumerate(ends) if end < start), len(ends))
-        ends[row : row + 1] = [start + width + 6]
-        axes.annotate(
-            text,
-            (middle, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(start + width / 2 - middle * scale, 4 + 9 * row),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=6.5,
-            gid="phase",
-            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
-        )
-        before = after
-
-
-def _text_width(axes: Axes, text: str) -> float:
-    drawn = axes.text(0, 0, text, fontsize=6.5)
-    width = drawn.get_window_extent().width * 72 / axes.figure.dpi
-    drawn.remove()
-    return width
+def _mark_accuracy(axes: Axes, accuracy: float) -> None:
+    if not accuracy > 0:
+        return
+    axes.axhline(accuracy, color=GREY, linestyle=(0, (4, 2)), linewidth=0.8, zorder=1, gid="accuracy")
+    axes.annotate(
+        f"accuracy: J = {accuracy:g}",
+        (0.0, accuracy),
+        xycoords=("axes fraction", "data"),
+        xytext=(3, -2),
+        textcoords="offset points",
+        va="top",
+        fontsize=7,
+        color="0.3",
+    )

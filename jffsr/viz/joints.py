@@ -32,8 +32,8 @@ def draw_joints(dataset: Dataset, prismatic: Sequence[bool] | None = None) -> Fi
     """Three stacked panels of a run's joint motion: angles in deg, rates and accelerations.
 
     dataset is a run's result.nc; `prismatic` (n,) says which joints slide (none): they get three panels of
-    their own, in m. Limits that the curves come near are dashed, and the axes are shaded beyond those that all
-    joints share.
+    their own, in m. Limits that the curves come near are dashed, and the panel is shaded beyond those that
+    all joints share.
     """
     names = [str(name) for name in dataset["joint"].values]
     slides = np.zeros(len(names), bool) if prismatic is None else np.asarray(prismatic, bool)

@@ -9,8 +9,10 @@ from matplotlib.axes import Axes
 
 from jffsr.viz.style import GREY, SHADE
 
-# A limit is drawn when it lies within this fraction of the curves' range beyond them.
+# A limit that all curves share is drawn when it lies within this fraction of their range beyond them,
 _NEAR = 0.3
+# and one that only some have, when one of these comes as close as this: others would only be in the way.
+_CLOSE = 0.12
 
 
 def frame_curves(
@@ -18,27 +20,38 @@ def frame_curves(
 ) -> bool:
     """Set the vertical range for `values` (N + 1, k) and draw the limits (k,) that are near; say if any was.
 
-    Infinite limits are none. A limit that not all k curves share is marked with the names of those it holds for.
+    Infinite limits are none. A limit that not all k curves share is marked with the names of those that do.
     """
     low, high = _range(values)
-    reach = _NEAR * (high - low)
-    drawn = [
-        (level, [name for name, limit in zip(names, limits, strict=True) if limit == level], above)
-        for limits, above in ((np.asarray(lower), False), (np.asarray(upper), True))
-        for level in np.unique(limits[np.isfinite(limits)])
-        if low - reach <= level <= high + reach
-    ]
+    span = high - low
+    drawn = []
+    for limits, side in ((np.asarray(lower), -1), (np.asarray(upper), 1)):
+        for level in np.unique(limits[np.isfinite(limits)]):
+            shared = bool(np.all(limits == level))
+            reach = (_NEAR if shared else _CLOSE) * span
+            held = np.flatnonzero(limits == level)
+            peaks = [_peak(values[:, index], side) for index in held]
+            if any(side * (level - peak) <= reach for peak in peaks):
+                drawn.append((float(level), side, None if shared else [names[index] for index in held]))
     levels = [level for level, _, _ in drawn]
     low, high = min([low, *levels]), max([high, *levels])
     pad = 0.07 * (high - low)
     axes.set_ylim(low - pad, high + pad)
-    for level, holders, above in drawn:
+    written: list[float] = []
+    for level, side, holders in drawn:
         axes.axhline(level, color=GREY, linestyle=(0, (4, 2)), linewidth=0.7, zorder=1, gid="limit")
-        if len(holders) == len(names):
-            axes.axhspan(level, (high + pad) if above else (low - pad), color=SHADE, linewidth=0, zorder=0)
-        else:
-            _write_holders(axes, level, holders, names, above)
+        if holders is None:
+            axes.axhspan(level, (high + pad) if side > 0 else (low - pad), color=SHADE, linewidth=0, zorder=0)
+        elif all(abs(level - other) > 0.11 * (high - low) for other in written):
+            _write_holders(axes, level, holders, names)
+            written.append(level)
     return bool(drawn)
+
+
+def _peak(curve: np.ndarray, side: int) -> float:
+    """The curve's greatest value (least for side -1); never near anything where nothing is finite."""
+    finite = curve[np.isfinite(curve)]
+    return float(side * np.max(side * finite)) if finite.size else -side * np.inf
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
@@ -51,7 +64,7 @@ def _range(values: np.ndarray) -> tuple[float, float]:
     return (low, high) if high - low > smallest else (low - 0.5, high + 0.5)
 
 
-def _write_holders(axes: Axes, level: float, holders: list[str], names: Sequence[str], above: bool) -> None:
+def _write_holders(axes: Axes, level: float, holders: list[str], names: Sequence[str]) -> None:
     places = [list(names).index(name) for name in holders]
     consecutive = len(places) > 2 and places == list(range(places[0], places[-1] + 1))
     text = f"{holders[0]} … {holders[-1]}" if consecutive else ", ".join(holders[:3])
@@ -61,10 +74,12 @@ def _write_holders(axes: Axes, level: float, holders: list[str], names: Sequence
         text,
         (1.0, level),
         xycoords=("axes fraction", "data"),
-        xytext=(-2, -1.5 if above else 1.5),
+        xytext=(-2, -0.5),
         textcoords="offset points",
         ha="right",
-        va="top" if above else "bottom",
+        va="center",
         fontsize=6,
-        color=GREY,
+        color="0.3",
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.3},
+        zorder=1.5,  # over its own line and under every curve
     )

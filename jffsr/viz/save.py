@@ -37,7 +37,7 @@ def save_figures(robot: Robot, dataset: Dataset, folder: str | Path) -> list[Pat
 
 @styled
 def save_figure(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure to `stem`.png and `stem`.pdf, each first beside its place, then moved there; their paths."""
+    """Write a figure to `stem`.png and `stem`.pdf, each beside its place and then moved; their paths."""
     paths = []
     for kind, metadata in (("png", {"Software": None}), ("pdf", {"CreationDate": None})):
         path = stem.with_name(f"{stem.name}.{kind}")

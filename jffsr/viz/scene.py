@@ -57,7 +57,9 @@ def scene_of(robot: Robot, dataset: Dataset) -> Scene:
     )
     box_axes, sides = base_box(robot)
     corners = np.array(list(product((-0.5, 0.5), repeat=3))) * sides @ box_axes.T
-    base_faces = kin.origin[:, 0, None, None] + np.einsum("tij,fcj->tfci", kin.rotation[:, 0], corners[_FACES])
+    base_faces = kin.origin[:, 0, None, None] + np.einsum(
+        "tij,fcj->tfci", kin.rotation[:, 0], corners[_FACES]
+    )
     topology = robot.topology
     tools = np.stack(
         [
@@ -80,7 +82,7 @@ def scene_of(robot: Robot, dataset: Dataset) -> Scene:
 
 
 def base_box(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Axes (3, 3), as columns in B, and sides (3,), m, of the uniform box with the base's mass and inertia."""
+    """Axes (3, 3), columns in B, and sides (3,), m, of the uniform box with the base's mass and inertia."""
     inertia, mass = np.asarray(robot.inertia[0]), float(robot.mass[0])
     off = np.abs(inertia - np.diag(np.diag(inertia))).max()
     # Rounding off the diagonal must not turn a cube.

@@ -13,6 +13,7 @@ import matplotlib
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 
 WIDTH = 3.5  # in
 GREY = "0.45"
@@ -20,8 +21,15 @@ SHADE = "0.92"
 
 # Okabe and Ito's palette, dark to light; its yellow is left out, since it is lost on white paper.
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-# Five patterns to seven colours: the pair repeats only after 35 lines.
-DASHES = ("-", (0, (5, 1.4)), (0, (1.2, 1.2)), (0, (5, 1.4, 1.2, 1.4)), (0, (9, 2)))
+# Six patterns to seven colours: the pair repeats only after 42 lines.
+DASHES = (
+    "-",
+    (0, (5, 1.4)),
+    (0, (1.2, 1.2)),
+    (0, (5, 1.4, 1.2, 1.4)),
+    (0, (10, 2.5)),
+    (0, (7, 1.3, 1.2, 1.3, 1.2, 1.3)),
+)
 
 _SETTINGS = {
     "font.family": "sans-serif",
@@ -33,7 +41,7 @@ _SETTINGS = {
     "ytick.labelsize": 7,
     "legend.fontsize": 7,
     "legend.frameon": False,
-    "legend.handlelength": 2.4,
+    "legend.handlelength": 2.7,
     "legend.handletextpad": 0.5,
     "legend.columnspacing": 1.2,
     "legend.labelspacing": 0.25,
@@ -85,7 +93,7 @@ def line_look(index: int) -> dict:
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
-def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **options) -> Legend:
     """One legend above all axes, read row by row, in as few rows as the figure's width allows."""
     count = len(handles)
     for rows in range(1, count + 1):
@@ -97,7 +105,9 @@ def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str
             [labels[i] for i in order],
             loc="outside upper center",
             ncols=columns,
+            **options,
         )
         if columns == 1 or legend.get_window_extent().width <= 0.98 * figure.bbox.width:
-            return
+            break
         legend.remove()
+    return legend
