@@ -6,12 +6,13 @@ import jax
 import numpy as np
 import pytest
 from motions import robot_from_record
-from runs import run_dataset
+from viz_runs import run_dataset
 
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.robots.state import State
+from jffsr.viz.convergence import draw_convergence
 from jffsr.viz.motion import draw_robot
-from jffsr.viz.save import save_figures
+from jffsr.viz.save import save_figure, save_figures
 from jffsr.viz.scene import base_box, scene_of
 
 
@@ -100,11 +101,11 @@ def test_files_are_written_whole(planar2, tmp_path):
         assert len(content) > 5000
 
 
-def test_a_figure_that_fails_leaves_no_file(planar2, tmp_path, monkeypatch):
+def test_a_figure_that_fails_leaves_no_file(tmp_path, monkeypatch):
     def fail(*args):
         raise OSError("disk full")
 
     monkeypatch.setattr("jffsr.viz.save.os.replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        save_figures(planar2, run_dataset(joints=2), tmp_path)
+        save_figure(draw_convergence(run_dataset()), tmp_path / "convergence")
     assert list(tmp_path.iterdir()) == []
