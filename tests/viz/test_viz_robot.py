@@ -34,14 +34,14 @@ def test_scene_stands_where_the_kinematics_says(robots):
     run = run_dataset(joints=list(robot.joint_names))
     scene = scene_of(robot, run)
     sample = 17
-    with jax.disable_jit():
-        kin = kinematics(
-            robot,
-            State(
-                *(run[name].values[sample] for name in ("base_position", "base_quaternion", "joint_position"))
-            ),
-        )
-        tools = [end_effector_pose(robot, kin, name)[0] for name in robot.end_effector_names]
+    values = [run[name].values[sample] for name in ("base_position", "base_quaternion", "joint_position")]
+
+    @jax.jit
+    def expected(*values):
+        kin = kinematics(robot, State(*values))
+        return kin, [end_effector_pose(robot, kin, name)[0] for name in robot.end_effector_names]
+
+    kin, tools = expected(*values)
     np.testing.assert_allclose(scene.tools[sample], np.stack(tools), atol=1e-12)
     np.testing.assert_allclose(scene.joints[sample], kin.anchor, atol=1e-12)
     np.testing.assert_allclose(scene.base_faces[sample].mean(axis=(0, 1)), kin.base_position, atol=1e-12)
