@@ -13,6 +13,7 @@ from jffsr.viz.style import GREY, SHADE
 _NEAR = 0.3
 # and one that only some have, when one of these comes as close as this: others would only be in the way.
 _CLOSE = 0.12
+_LONGEST = 32  # letters on a limit's line
 
 
 def frame_curves(
@@ -66,10 +67,11 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 
 def _write_holders(axes: Axes, level: float, holders: list[str], names: Sequence[str]) -> None:
     places = [list(names).index(name) for name in holders]
-    consecutive = len(places) > 2 and places == list(range(places[0], places[-1] + 1))
-    text = f"{holders[0]} … {holders[-1]}" if consecutive else ", ".join(holders[:3])
-    if len(holders) > 3 and not consecutive:
-        text += ", …"
+    text = ", ".join(holders)
+    if len(holders) > 2 and places == list(range(places[0], places[-1] + 1)):
+        text = f"{holders[0]} … {holders[-1]}"
+    if len(holders) > 1 and len(text) > _LONGEST:
+        text = f"{holders[0]} and {len(holders) - 1} more"
     axes.annotate(
         text,
         (1.0, level),
