@@ -36,6 +36,10 @@ _HOME = {
     "minimize": "jffsr.optimizers.minimize",
     "Problem": "jffsr.planning.problem",
     "Plan": "jffsr.planning.plan",
+    "plan_many": "jffsr.planning.many",
+    "Settings": "jffsr.optimizers.registry",
+    "composite_index": "jffsr.objectives.composite",
+    "solve": "jffsr.planning.plan",
     "plan": "jffsr.study.planning",
 }
 

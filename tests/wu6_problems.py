@@ -29,7 +29,13 @@ def limited(robot: Robot, rate: float = 0.25, acceleration: float = 0.2, positio
 
 
 def wu6_problem(
-    robot: Robot, num_steps: int = 12, duration: float = 30.0, start=START, goal=GOAL, momentum=None, **objective
+    robot: Robot,
+    num_steps: int = 12,
+    duration: float = 30.0,
+    start=START,
+    goal=GOAL,
+    momentum=None,
+    **objective,
 ) -> Problem:
     """A rest-to-rest motion; keywords go to `composite_index`, an excursion limit of 10 degrees by default."""
     lower, upper = robot.limits.position_lower, robot.limits.position_upper

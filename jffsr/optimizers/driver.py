@@ -127,8 +127,8 @@ def run(
 ) -> Outcome:
     """Run the phases one after another and return the best point found.
 
-    `on_chunk` sees a snapshot after every chunk (and after each phase's first evaluations), from which
-    `resume` goes on to the same bits. `interrupted` is asked between chunks.
+    `on_chunk` sees a snapshot after every chunk, from which `resume` goes on to the same bits.
+    `interrupted` is asked between chunks.
     """
     if not phases:
         raise InputError("there is no phase to run")
@@ -140,12 +140,7 @@ def run(
         before = _evaluations_before(history, index)
         if state is None:
             state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
-            p = jax.device_get(state.progress)
-            history.append(
-                _record(index, before, p.iteration, p.evaluations, p.gradient_evaluations, p.best_value)
-            )
-            _tell(on_chunk, index, state, history)
-        while not bool(phase.stop.reached(state.progress)):
+        while not phase.stop.reached(jax.device_get(state.progress)):
             if interrupted():
                 return _outcome(phase, state, history, "interrupted")
             last = int(state.progress.iteration)
@@ -194,8 +189,8 @@ def _outcome(phase: Phase, state, history: list[Record], reason: str) -> Outcome
     return Outcome(
         best_position=np.asarray(progress.best_position),
         best_value=float(progress.best_value),
-        evaluations=history[-1].evaluations,
-        gradient_evaluations=history[-1].gradient_evaluations,
+        evaluations=history[-1].evaluations if history else 0,
+        gradient_evaluations=history[-1].gradient_evaluations if history else 0,
         history=tuple(history),
         reason=reason,
         population=jax.device_get(phase.optimizer.population(state)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +16,7 @@ from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Result, ResultCode, Tolerances, explain, result_code
+from jffsr.planning.result import Result, Tolerances, explain, result_code
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
 from jffsr.rollouts.motion import Motion
@@ -49,6 +50,32 @@ class Plan:
         """The first record of the history whose best value is at most `value`."""
         return next((record for record in self.history if record.best_value <= value), None)
 
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion as CSV; see `jffsr.planning.export.to_csv`."""
+        from jffsr.planning.export import to_csv
+
+        to_csv(self, path)
+
+    def to_mat(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion for MATLAB or Octave; see `jffsr.planning.export.to_mat`."""
+        from jffsr.planning.export import to_mat
+
+        to_mat(self, path)
+
+    def joint_table(self, period: float) -> dict[str, np.ndarray]:
+        """Joint motion every `period` s; see `jffsr.planning.export.joint_table`."""
+        from jffsr.planning.export import joint_table
+
+        return joint_table(self, period)
+
+
+class SearchInterrupted(Exception):
+    """A search was stopped from outside before its end; `outcome` is what it had found."""
+
+    def __init__(self, outcome: Outcome):
+        super().__init__("the search was interrupted")
+        self.outcome = outcome
+
 
 @partial(jax.jit, static_argnums=2)
 def _verified(problem: Problem, candidate, step_factor: int):
@@ -64,15 +91,21 @@ def solve(
     seed: int = 0,
     chunk: int = 10,
     step_factor: int = 4,
+    precision: str = "float64",
     tolerances: Tolerances | None = None,
     resume: Snapshot | None = None,
     on_chunk: Callable[[Snapshot], None] | None = None,
     interrupted: Callable[[], bool] = lambda: False,
 ) -> Plan:
-    """Search with a registered optimizer, verify what it found, and say what became of it."""
+    """Search with a registered optimizer, verify what it found, and say what became of it.
+
+    The arguments are those of the driver, and step_factor and tolerances of the verification, which is in
+    float64 also where precision is float32. Raises SearchInterrupted where `interrupted` said so, and
+    InputError with 64-bit floats off, unless precision is float32.
+    """
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
-    _check_precision()
+    check_precision(precision)
     with Stopwatch() as watch:
         outcome = run(
             build_phases(optimizer, settings),
@@ -83,19 +116,22 @@ def solve(
             on_chunk=on_chunk,
             interrupted=interrupted,
         )
-        verified = _verified(problem, jnp.asarray(outcome.best_position), step_factor)
-        code = result_code(problem, verified[2], _at_its_end(outcome), tolerances)
-        motion, terms, verification = jax.device_get(verified)
+        if outcome.interrupted:
+            raise SearchInterrupted(outcome)
+        with jax.enable_x64(True):
+            free = jnp.asarray(np.asarray(outcome.best_position, dtype=float))
+            verified = _verified(problem, free, step_factor)
+            code = result_code(problem, verified[2], _at_its_end(outcome), tolerances)
+            motion, terms, verification = jax.device_get(verified)
+            trajectory = jax.device_get(problem.trajectory.with_free(free))
     result = explain(int(code), problem, verification, tolerances)
-    if outcome.interrupted:
-        result = explain(ResultCode.INTERRUPTED, problem, verification, tolerances)
     return Plan(
         problem=problem,
         result=result,
         cost=outcome.best_value,
         terms=terms,
         free=outcome.best_position,
-        trajectory=jax.device_get(problem.trajectory.with_free(jnp.asarray(outcome.best_position))),
+        trajectory=trajectory,
         motion=motion,
         verification=verification,
         evaluations=outcome.evaluations,
@@ -115,8 +151,9 @@ def _at_its_end(outcome: Outcome) -> bool:
     return bool(np.isfinite(earlier) and earlier - values[-1] <= 0.01 * abs(earlier))
 
 
-def _check_precision() -> None:
-    if not jax.config.jax_enable_x64:
+def check_precision(precision: str) -> None:
+    """Refuse to plan in float64 while JAX's 64-bit floats are off."""
+    if precision == "float64" and not jax.config.jax_enable_x64:
         raise InputError(
             "planning needs float64: call jax.config.update('jax_enable_x64', True) first "
             "(or ask for precision: float32)"

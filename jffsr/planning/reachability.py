@@ -31,11 +31,13 @@ def check_duration_possible(
     if not np.any(least > duration):
         return
     sentences = []
-    for i in np.flatnonzero(least > duration):
+    for i in np.flatnonzero(least >= 0.999 * least.max()):
         slides = robot.topology.joint_types[i] == PRISMATIC
         distance = abs(goal[i] - start[i])
         moved = f"{distance:.4g} m" if slides else f"{np.rad2deg(distance):.4g} deg"
-        needs = _needs(distance, robot.limits.velocity[i], robot.limits.acceleration[i], "m" if slides else "rad")
+        needs = _needs(
+            distance, robot.limits.velocity[i], robot.limits.acceleration[i], "m" if slides else "rad"
+        )
         sentences.append(f"{robot.joint_names[i]} moves {moved} from rest to rest, which needs {needs}")
     raise InputError(
         f"{where}: found {duration:g} s, at least {least.max():.2f} s is needed: " + "; ".join(sentences)

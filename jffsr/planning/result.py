@@ -23,7 +23,6 @@ class ResultCode(IntEnum):
     NOT_CONVERGED = 3
     NOT_VERIFIED = 4
     NOT_FINITE = 5
-    INTERRUPTED = 6
 
 
 @dataclass(frozen=True)
@@ -71,10 +70,8 @@ def result_code(
 _KINDS = ("position", "rate", "acceleration", "excursion")
 
 
-def explain(
-    code: int, problem: Problem, verification: Verification, tolerances: Tolerances, reason: str = ""
-) -> Result:
-    """The sentence of advice that goes with a code; host only. `reason` is why the search ended."""
+def explain(code: int, problem: Problem, verification: Verification, tolerances: Tolerances) -> Result:
+    """The sentence of advice that goes with a code; host only."""
     code = ResultCode(int(code))
     cost, accuracy = float(verification.cost), float(problem.objective.accuracy)
     broken = list(violations(problem, verification.overruns, tolerances))
@@ -101,13 +98,11 @@ def explain(
         text = (
             "not verified: " + ", ".join(_unverified(verification, tolerances)) + "; raise rollout.num_steps"
         )
-    elif code is ResultCode.INTERRUPTED:
-        text = "interrupted: a checkpoint was written; the same command goes on from there"
     else:
         text = (
             "no finite index was found: every candidate gave NaN or infinity; check the robot and the terms"
         )
-    return Result(code, text if reason != "interrupted" else f"{text} (interrupted)")
+    return Result(code, text)
 
 
 def _binding(verification: Verification) -> str:

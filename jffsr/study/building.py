@@ -116,7 +116,9 @@ def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: n
     key = config.task.key_of(quantity)
     where = config.where(f"task.{key}")
     if value.size != robot.num_joints:
-        raise InputError(f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints")
+        raise InputError(
+            f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints"
+        )
     for i, name in enumerate(robot.joint_names):
         low, high = robot.limits.position_lower[i], robot.limits.position_upper[i]
         if not (np.isfinite(low) and np.isfinite(high)):
@@ -126,7 +128,9 @@ def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: n
             )
         if not low < value[i] < high:
             slides = robot.topology.joint_types[i] == PRISMATIC
-            shown = [x if slides or not key.endswith("_deg") else np.rad2deg(x) for x in (value[i], low, high)]
+            shown = [
+                x if slides or not key.endswith("_deg") else np.rad2deg(x) for x in (value[i], low, high)
+            ]
             unit = "m" if slides else ("deg" if key.endswith("_deg") else "rad")
             place = "on a limit of" if value[i] in (low, high) else "outside"
             raise InputError(
@@ -183,7 +187,9 @@ def _user_term(config: PlanningConfig, index: int) -> UserTerm:
     try:
         function = getattr(importlib.import_module(module), name)
     except Exception as error:
-        raise InputError(f"{where}: '{term.call}' cannot be imported ({type(error).__name__}: {error})") from None
+        raise InputError(
+            f"{where}: '{term.call}' cannot be imported ({type(error).__name__}: {error})"
+        ) from None
     finally:
         if added:
             sys.path.remove(folder)

@@ -35,9 +35,7 @@ def save_checkpoint(path: Path, snapshot: Snapshot) -> None:
     write_atomically(path, write)
 
 
-def load_checkpoint(
-    path: Path, phases: list[Phase], problem: OptimizationProblem, key: Array
-) -> Snapshot:
+def load_checkpoint(path: Path, phases: list[Phase], problem: OptimizationProblem, key: Array) -> Snapshot:
     """Read a snapshot of these phases; InputError where the file is damaged or of another search."""
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -45,13 +43,17 @@ def load_checkpoint(
             history = file["history"]
             leaves = [file[f"leaf{i}"] for i in range(head["leaves"])]
     except Exception as error:
-        raise InputError(f"{path}: the checkpoint cannot be read ({error}); delete it to start again") from None
+        raise InputError(
+            f"{path}: the checkpoint cannot be read ({error}); delete it to start again"
+        ) from None
     if head.get("format") != _FORMAT or not 0 <= head["phase"] < len(phases):
         raise InputError(f"{path}: the checkpoint is of another version; delete it to start again")
     shapes, structure = jax.tree.flatten(blank_state(phases, head["phase"], problem, key))
     if len(shapes) != len(leaves):
         raise InputError(f"{path}: the checkpoint is of another search; delete it to start again")
-    state = structure.unflatten([_from_numpy(leaf, shape) for leaf, shape in zip(leaves, shapes, strict=True)])
+    state = structure.unflatten(
+        [_from_numpy(leaf, shape) for leaf, shape in zip(leaves, shapes, strict=True)]
+    )
     records = tuple(Record(int(p), int(i), int(e), int(g), float(b)) for p, i, e, g, b in history)
     return Snapshot(head["phase"], state, records)
 

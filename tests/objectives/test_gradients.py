@@ -124,7 +124,9 @@ def degenerate_points(robot, z) -> dict[str, tuple[Problem, np.ndarray]]:
         "excursion at its limits": (with_term(base, "attitude_excursion", limit=angles), z),
         "everything at its limits": (
             with_term(
-                with_term(with_term(base, "joint_rate", limit=rate), "joint_acceleration", limit=acceleration),
+                with_term(
+                    with_term(base, "joint_rate", limit=rate), "joint_acceleration", limit=acceleration
+                ),
                 "attitude_excursion",
                 limit=angles,
             ),

@@ -38,7 +38,8 @@ def message(text, *overrides):
     with pytest.raises(InputError) as caught:
         load(text, *overrides)
     sentence = str(caught.value)
-    assert "\n" not in sentence and len(sentence) < 600
+    assert "\n" not in sentence
+    assert len(sentence) < 600
     return sentence
 
 

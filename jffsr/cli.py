@@ -1,0 +1,170 @@
+"""The command line: parse, call the study, print."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+from jffsr.errors import InputError
+
+MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
+
+_DESCRIPTION = """\
+Plan the motion of free-floating space robots: satellites whose arms move while the thrusters are off.
+
+A study is one YAML file. 'jffsr run' searches for a motion, re-runs what it found at a finer step by
+independent code, and leaves everything in a run folder; 'jffsr check' then drives the same robot along the
+plan in MuJoCo and in MJX."""
+
+_EPILOG = """\
+examples:
+  jffsr run configs/planning/composite_wu6.yaml
+  jffsr run composite_wu6 optimizer.particles=64 task.duration=25 --out runs/faster
+  jffsr check runs/composite_wu6
+  jffsr robots wu_6dof
+
+exit status: 0 done and accuracy met; 3 done, accuracy not met; 2 bad input; 130 interrupted, checkpoint
+written (the same command with the same --out goes on from there); 1 a defect."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        return arguments.command(arguments)
+    except InputError as error:
+        print(f"jffsr: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("jffsr: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output has gone; what was computed is already in its folder.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return MET
+    except Exception:
+        traceback.print_exc()
+        print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
+        return DEFECT
+
+
+def _parser() -> argparse.ArgumentParser:
+    from jffsr import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="jffsr",
+        description=_DESCRIPTION,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"jffsr {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="run one study", description="Run one study, whatever its kind.")
+    run.add_argument("config", metavar="CONFIG", help="a YAML file, or a name under configs/")
+    run.add_argument(
+        "overrides", metavar="KEY=VALUE", nargs="*", help="replaces a value, for example task.duration=25"
+    )
+    run.add_argument(
+        "--out",
+        metavar="DIR",
+        help="the run folder; an existing one of the same configuration is gone on with "
+        "(default: the first free of runs/NAME, runs/NAME-2, ...)",
+    )
+    run.set_defaults(command=_run)
+
+    check = commands.add_parser(
+        "check",
+        help="re-verify a finished run with MuJoCo and MJX",
+        description="Drive the robot's joints along the plan by torques alone in MuJoCo and in MJX, and report "
+        "the differences in base pose and momentum.",
+    )
+    check.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
+    check.set_defaults(command=_check)
+
+    show = commands.add_parser(
+        "show",
+        help="print a finished run and draw its figures",
+        description="Print a finished run and draw it.",
+    )
+    show.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
+    show.set_defaults(command=_show)
+
+    robots = commands.add_parser(
+        "robots",
+        help="the catalogue of robots, with sources",
+        description="List the catalogue, or one robot.",
+    )
+    robots.add_argument("robot", metavar="NAME", nargs="?", help="a catalogue name or a robot file")
+    robots.set_defaults(command=_robots)
+    return parser
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from jffsr.study.config import load_config
+
+    config = load_config(arguments.config, arguments.overrides)
+    _prepare_jax(config.precision)
+    from jffsr.study.planning import run_planning
+    from jffsr.study.summary import summary_text
+
+    run = run_planning(config, arguments.out, say=print)
+    if run.interrupted:
+        path = run.folder.path
+        print(
+            f"interrupted; '{path}' has the checkpoint, and the same command with --out {path} goes on from it",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    if run.already_finished:
+        print(f"{run.folder.path} is finished:\n")
+    print(summary_text(run.summary))
+    print(f"  folder        {run.folder.path}")
+    return MET if run.summary["result"]["code"] == 0 else NOT_MET
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    _prepare_jax()
+    from jffsr.study.reviewing import check_run
+
+    report = check_run(arguments.run)
+    print(report.to_text())
+    return MET if report.passed else NOT_MET
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    _prepare_jax()
+    from jffsr.study.reviewing import redraw_run
+    from jffsr.study.run_folder import RunFolder
+    from jffsr.study.summary import summary_text
+
+    files = redraw_run(arguments.run)
+    summary = RunFolder(Path(arguments.run)).read_summary()
+    print(summary_text(summary))
+    print("  figures       " + "\n                ".join(str(file) for file in files))
+    return MET
+
+
+def _robots(arguments: argparse.Namespace) -> int:
+    from jffsr.study.catalogue import catalogue_text, robot_text
+
+    print(catalogue_text() if arguments.robot is None else robot_text(arguments.robot))
+    return MET
+
+
+def _prepare_jax(precision: str = "float64") -> None:
+    """Set what only an entry point may set: the precision, and a folder that keeps compiled programs."""
+    import jax
+
+    jax.config.update("jax_enable_x64", precision == "float64")
+    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jffsr" / "xla"
+    jax.config.update("jax_compilation_cache_dir", os.environ.get("JFFSR_CACHE_DIR", str(default)))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

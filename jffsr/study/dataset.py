@@ -1,0 +1,99 @@
+"""A plan as labelled arrays: what result.nc holds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
+from jffsr.planning.plan import Plan
+from jffsr.study.atomic import write_atomically
+
+_SECOND = {"revolute": "rad", "prismatic": "m"}
+
+
+def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
+    """An xarray Dataset of a plan: motion, limits, the search's history and the free numbers, with units."""
+    import xarray
+
+    motion, robot = plan.motion, plan.problem.robot
+    history = np.array(plan.history, dtype=float).reshape(-1, 5)
+    unit = "/".join(sorted({_SECOND[kind] for kind in robot.topology.joint_types}))
+    excursion, measure = np.full(3, np.inf), ROTATION_VECTOR
+    for term in plan.problem.objective.terms:
+        if isinstance(term, AttitudeExcursion):
+            excursion, measure = np.asarray(term.limit), term.measure
+    limits = robot.limits
+
+    def of(dims, values, units, meaning):
+        dims = dims if isinstance(dims, tuple) else (dims,)
+        return dims, np.asarray(values), {"units": units, "long_name": meaning}
+
+    return xarray.Dataset(
+        {
+            "joint_position": of(("time", "joint"), motion.joint_position, unit, "joint position"),
+            "joint_velocity": of(("time", "joint"), motion.joint_velocity, f"{unit}/s", "joint rate"),
+            "joint_acceleration": of(
+                ("time", "joint"), motion.joint_acceleration, f"{unit}/s^2", "joint acceleration"
+            ),
+            "base_position": of(
+                ("time", "axis"), motion.base_position, "m", "base centre of mass, inertial frame"
+            ),
+            "base_quaternion": of(
+                ("time", "component"), motion.base_quaternion, "1", "base to inertial frame"
+            ),
+            "base_twist": of(
+                ("time", "twist"), motion.base_twist, "m/s, rad/s", "base twist, inertial frame"
+            ),
+            "attitude_angle": of(
+                ("time", "axis"),
+                attitude_angles(motion, measure),
+                "rad",
+                f"base attitude relative to its start ({measure})",
+            ),
+            "momentum": of(
+                "twist", motion.momentum, "N s, N m s", "linear, angular about the centre of mass"
+            ),
+            "joint_position_lower": of("joint", limits.position_lower, unit, "lower position limit"),
+            "joint_position_upper": of("joint", limits.position_upper, unit, "upper position limit"),
+            "joint_velocity_limit": of("joint", limits.velocity, f"{unit}/s", "rate limit"),
+            "joint_acceleration_limit": of("joint", limits.acceleration, f"{unit}/s^2", "acceleration limit"),
+            "excursion_limit": of("axis", excursion, "rad", "base attitude excursion limit"),
+            "history_phase": of("iteration", history[:, 0].astype(int), "1", "phase of the search"),
+            "history_evaluations": of("iteration", history[:, 2].astype(int), "1", "objective evaluations"),
+            "history_gradient_evaluations": of(
+                "iteration", history[:, 3].astype(int), "1", "gradient evaluations"
+            ),
+            "history_best_value": of("iteration", history[:, 4], "1", "best index so far"),
+            "free_numbers": of("free", plan.free, "1", "free numbers of the trajectory"),
+        },
+        coords={
+            "time": ("time", np.asarray(motion.time), {"units": "s"}),
+            "joint": ("joint", list(robot.joint_names)),
+            "axis": ("axis", ["x", "y", "z"]),
+            "component": ("component", ["w", "x", "y", "z"]),
+            "twist": ("twist", ["vx", "vy", "vz", "wx", "wy", "wz"]),
+        },
+        attrs={
+            "name": name,
+            "robot": robot.name,
+            "phase_names": json.dumps(phase_names),
+            "accuracy": float(plan.problem.objective.accuracy),
+            "index": float(plan.cost),
+        },
+    )
+
+
+def save_dataset(dataset, path: Path) -> None:
+    """Write a Dataset as netCDF-4 atomically."""
+    write_atomically(path, lambda part: dataset.to_netcdf(part, engine="h5netcdf"))
+
+
+def open_dataset(path: Path):
+    """Read a Dataset written by `save_dataset` into memory."""
+    import xarray
+
+    with xarray.open_dataset(path, engine="h5netcdf") as dataset:
+        return dataset.load()

@@ -1,0 +1,131 @@
+"""A planning study: from a configuration to a plan, in memory or in a run folder."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from jffsr.errors import InputError
+from jffsr.optimizers.driver import Snapshot
+from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.planning.plan import Plan, SearchInterrupted, solve
+from jffsr.planning.problem import Problem
+from jffsr.study.atomic import write_json
+from jffsr.study.building import build_problem, build_settings, build_tolerances
+from jffsr.study.checkpoint import load_checkpoint, save_checkpoint
+from jffsr.study.config import load_config
+from jffsr.study.dataset import plan_dataset, save_dataset
+from jffsr.study.interrupt import Interrupt
+from jffsr.study.progress import progress_bar
+from jffsr.study.run_folder import RunFolder, claim_run_folder
+from jffsr.study.schema import PlanningConfig
+from jffsr.study.summary import plan_summary
+
+
+def plan(
+    config: str | os.PathLike[str] | PlanningConfig | Problem,
+    overrides: Sequence[str] = (),
+    *,
+    optimizer: str = "hybrid",
+    settings: Settings | None = None,
+    seed: int = 0,
+) -> Plan:
+    """Plan a motion: the same search and verification as `jffsr run`, returned instead of written.
+
+    config is a path, a name under `configs/`, a loaded configuration, or a Problem built in Python; only for
+    a Problem are optimizer, settings and seed read. Raises InputError where the input is at fault, and where
+    64-bit floats are off though the configuration does not ask for precision: float32.
+    """
+    if isinstance(config, Problem):
+        return solve(config, optimizer, settings, seed=seed)
+    if not isinstance(config, PlanningConfig):
+        config = load_config(config, overrides)
+    elif overrides:
+        raise InputError("overrides go with a configuration's path or name, not with a loaded one")
+    return _solve(config, build_problem(config))
+
+
+def _solve(config: PlanningConfig, problem: Problem, **hooks: Any) -> Plan:
+    kind, settings = build_settings(config)
+    return solve(
+        problem,
+        kind,
+        settings,
+        seed=config.seed,
+        chunk=config.optimizer.chunk,
+        step_factor=config.verification.step_factor,
+        tolerances=build_tolerances(config),
+        precision=config.precision,
+        **hooks,
+    )
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a run in a folder ended: its folder, its summary, and whether it was only interrupted."""
+
+    folder: RunFolder
+    summary: dict[str, Any] | None
+    interrupted: bool = False
+    already_finished: bool = False
+
+
+def run_planning(
+    config: PlanningConfig, out: str | Path | None, say: Callable[[str], None] = lambda text: None
+) -> Run:
+    """Run a planning study in its folder, going on from a checkpoint if there is one.
+
+    The problem is built, and so the input checked, before the folder is touched.
+    """
+    problem = build_problem(config)
+    folder = claim_run_folder(config, out)
+    if folder.finished:
+        return Run(folder, folder.read_summary(), already_finished=True)
+    kind, settings = build_settings(config)
+    phases = build_phases(kind, settings)
+    resume = None
+    if folder.checkpoint.is_file():
+        resume = load_checkpoint(folder.checkpoint, phases, problem, jax.random.key(config.seed))
+        say(f"going on from {folder.checkpoint} ({resume.history[-1].evaluations} evaluations done)")
+    done = resume.history[-1] if resume else None
+    folder.keep_metrics(done.evaluations if done else 0, done.gradient_evaluations if done else 0)
+    show, close = progress_bar(phases, config.output.progress)
+
+    def on_chunk(snapshot: Snapshot) -> None:
+        last = snapshot.history[-1]
+        folder.add_metrics(
+            phase=phases[snapshot.phase].name,
+            iteration=last.iteration,
+            evaluations=last.evaluations,
+            gradient_evaluations=last.gradient_evaluations,
+            best_value=last.best_value,
+        )
+        save_checkpoint(folder.checkpoint, snapshot)
+        show(snapshot)
+
+    with Interrupt() as interrupted:
+        try:
+            found = _solve(config, problem, resume=resume, on_chunk=on_chunk, interrupted=interrupted)
+        except SearchInterrupted:
+            return Run(folder, None, interrupted=True)
+        finally:
+            close()
+    _finish(folder, config, found, [phase.name for phase in phases])
+    return Run(folder, folder.read_summary())
+
+
+def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str]) -> None:
+    """Write the arrays, then the summary, which marks the run as finished, then the figures."""
+    dataset = plan_dataset(found, config.name, phase_names)
+    save_dataset(dataset, folder.result)
+    write_json(folder.summary, plan_summary(found, config.name, config.seed, build_tolerances(config)))
+    folder.checkpoint.unlink(missing_ok=True)
+    if config.output.figures:
+        from jffsr.viz.figures import save_figures
+
+        save_figures(found.problem.robot, dataset, folder.figures)

@@ -1,0 +1,45 @@
+"""The progress bar of a search, fed from the host between chunks."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+
+from jffsr.optimizers.driver import Phase, Snapshot
+
+
+def expected_evaluations(phases: list[Phase]) -> int | None:
+    """Evaluations and gradients that the phases may use at most; None when nothing bounds them."""
+    total = 0.0
+    for phase in phases:
+        each = getattr(phase.optimizer, "particles", None) or getattr(phase.optimizer, "starts", 1)
+        total += float(phase.stop.iterations) * each
+    return int(total) if math.isfinite(total) else None
+
+
+def progress_bar(phases: list[Phase], shown: bool) -> tuple[Callable[[Snapshot], None], Callable[[], None]]:
+    """A function that takes snapshots and draws them, and one that closes the bar.
+
+    The bar shows the phase, the best index, evaluations per second and the time left; it is drawn only on a
+    terminal.
+    """
+    from tqdm import tqdm
+
+    bar = tqdm(
+        total=expected_evaluations(phases),
+        unit="eval",
+        disable=None if shown else True,
+        file=sys.stderr,
+        dynamic_ncols=True,
+        smoothing=0.1,
+    )
+
+    def show(snapshot: Snapshot) -> None:
+        last = snapshot.history[-1]
+        bar.set_description(phases[snapshot.phase].name, refresh=False)
+        best = f"{last.best_value:.4g}" if math.isfinite(last.best_value) else "none yet"
+        bar.set_postfix_str(f"best J {best}", refresh=False)
+        bar.update(last.evaluations + last.gradient_evaluations - bar.n)
+
+    return show, bar.close

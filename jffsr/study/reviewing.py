@@ -1,0 +1,60 @@
+"""Looking at a finished run again: the cross-check with MuJoCo and MJX, and its figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jffsr.errors import InputError
+from jffsr.planning.problem import Problem
+from jffsr.study.atomic import write_json
+from jffsr.study.building import build_problem
+from jffsr.study.dataset import open_dataset
+from jffsr.study.run_folder import RunFolder
+
+
+def open_run(path: str | Path) -> tuple[RunFolder, Problem, Any]:
+    """The folder, the problem and the dataset of a finished run; InputError where something is missing."""
+    folder = RunFolder(Path(path))
+    if not folder.path.is_dir():
+        raise InputError(f"{path}: there is no such run folder")
+    problem = build_problem(folder.read_config())
+    folder.read_summary()
+    try:
+        dataset = open_dataset(folder.result)
+        free = dataset["free_numbers"].to_numpy()
+    except Exception as error:
+        raise InputError(f"{folder.result}: cannot be read ({error})") from None
+    lower, _ = problem.bounds()
+    if free.shape != lower.shape or not np.all(np.isfinite(free)):
+        raise InputError(f"{folder.result}: holds no plan of {folder.config} (free numbers {free.shape})")
+    return folder, problem, dataset
+
+
+def check_run(path: str | Path, steps: tuple[float, ...] = (2e-3, 1e-3)):
+    """Re-verify a finished run in MuJoCo and MJX; the report goes into its summary and is returned."""
+    from jffsr.crosscheck.compare import crosscheck
+
+    folder, problem, dataset = open_run(path)
+    trajectory = problem.trajectory.with_free(dataset["free_numbers"].to_numpy())
+    report = crosscheck(
+        problem.robot,
+        trajectory,
+        problem.initial_state,
+        momentum=problem.momentum,
+        steps=steps,
+    )
+    summary = folder.read_summary()
+    summary["verification"]["mujoco"] = report.to_dict()
+    write_json(folder.summary, summary)
+    return report
+
+
+def redraw_run(path: str | Path) -> list[Path]:
+    """Draw the figures of a finished run again and return their files."""
+    from jffsr.viz.figures import save_figures
+
+    folder, problem, dataset = open_run(path)
+    return save_figures(problem.robot, dataset, folder.figures)
