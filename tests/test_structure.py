@@ -103,7 +103,9 @@ def test_the_import_check_sees_lazy_and_relative_imports(monkeypatch, tmp_path):
 
 
 def test_files_are_short():
-    long = [f"{f.relative_to(PACKAGE)}" for f in FILES if len(f.read_text("utf-8").splitlines()) > LARGEST_FILE]
+    long = [
+        f"{f.relative_to(PACKAGE)}" for f in FILES if len(f.read_text("utf-8").splitlines()) > LARGEST_FILE
+    ]
     assert not long
 
 

@@ -118,9 +118,7 @@ def test_tool_position_from_oracle_numbers(oracles, make_motion, tool_distance):
             np.subtract(case["outputs"]["end_effectors"][0]["position"], case["outputs"]["system_com"])
             for case in (final, goal)
         ]
-        motion = make_motion(
-            [final["inputs"]["base_quat_wxyz"]] * 3, np.tile(final["inputs"]["q"], (5, 1))
-        )
+        motion = make_motion([final["inputs"]["base_quat_wxyz"]] * 3, np.tile(final["inputs"]["q"], (5, 1)))
         term = ToolPosition(
             np.array(1.0), np.array(goal["inputs"]["q"]), np.array(goal["inputs"]["base_quat_wxyz"])
         )

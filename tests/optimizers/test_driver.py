@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import chex
 import jax
@@ -85,7 +86,7 @@ def test_blank_state_has_the_shapes_of_every_phase(uninterrupted):
 def test_history_counts_from_the_start_of_the_run(uninterrupted):
     outcome, _ = uninterrupted
     best = [record.best_value for record in outcome.history]
-    assert all(b <= a for a, b in zip(best, best[1:], strict=False))
+    assert all(b <= a for a, b in pairwise(best))
     for counts in zip(*((r.evaluations, r.gradient_evaluations) for r in outcome.history), strict=True):
         assert list(counts) == sorted(counts)
     last_of_swarm = [r for r in outcome.history if r.phase == 0][-1]
@@ -99,7 +100,9 @@ def test_each_stopping_rule_ends_the_run():
     swarm = QPSO(iterations=50.0, particles=10)
     cases = {"iterations": 7.0, "evaluations": 65.0, "target": 1.0}
     for rule, number in cases.items():
-        outcome = run([Phase("swarm", swarm, Stop(**{"iterations": 50.0, rule: number}))], problem, KEY, chunk=4)
+        outcome = run(
+            [Phase("swarm", swarm, Stop(**{"iterations": 50.0, rule: number}))], problem, KEY, chunk=4
+        )
         if rule == "target":
             assert outcome.reason == "target"
             assert outcome.history[-2].best_value > 1.0 >= outcome.best_value
@@ -126,6 +129,9 @@ def test_other_numbers_do_not_trace_again(monkeypatch):
     for k in range(3):
         problem = FunctionProblem(LOWER[:4] - k, UPPER[:4] + k, rosenbrock)
         settings = replace(
-            SETTINGS, swarm_evaluations=70 + 10 * k, contraction=(1.0 + 0.1 * k, 0.5), gradient_iterations=9 + k
+            SETTINGS,
+            swarm_evaluations=70 + 10 * k,
+            contraction=(1.0 + 0.1 * k, 0.5),
+            gradient_iterations=9 + k,
         )
         run(build_phases("hybrid", settings), problem, jax.random.key(k), chunk=3)

@@ -77,9 +77,7 @@ def test_every_evaluation_is_counted():
         return np.sum(x**2)
 
     def counted(x):
-        return jax.pure_callback(
-            count, jax.ShapeDtypeStruct((), x.dtype), x, vmap_method="sequential"
-        )
+        return jax.pure_callback(count, jax.ShapeDtypeStruct((), x.dtype), x, vmap_method="sequential")
 
     settings = Settings(particles=5)
     outcome = minimize(counted, ([-1.0, -2.0], [3.0, 1.0]), "qpso", 23, settings=settings)
