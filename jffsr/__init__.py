@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _HOME = {
     "InputError": "jffsr.errors",
     "Robot": "jffsr.robots.robot",
+    "Limits": "jffsr.robots.robot",
     "State": "jffsr.robots.state",
     "load_robot": "jffsr.robots.loading",
     "list_robots": "jffsr.robots.loading",

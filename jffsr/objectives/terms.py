@@ -51,10 +51,13 @@ class Term(Protocol):
 def attitude_angles(motion: Motion, measure: str) -> Array:
     """Attitude angles (N + 1, 3), rad, of the base relative to its start.
 
-    The rotation vector of R(0)' R(t), or, as the paper has it, angles about z, x and y of that rotation.
+    The rotation vector of R(0)' R(t), or, as the paper has it, angles about z, x and y of that rotation;
+    the columns are about x, y, z either way.
     """
-    chart = quaternion_to_euler_zxy if measure == EULER_ZXY else quaternion_to_rotation_vector
-    return chart(_relative_to_start(motion))
+    relative = _relative_to_start(motion)
+    if measure == EULER_ZXY:
+        return quaternion_to_euler_zxy(relative)[..., jnp.array([1, 2, 0])]
+    return quaternion_to_rotation_vector(relative)
 
 
 def _relative_to_start(motion: Motion) -> Quaternion:

@@ -126,6 +126,6 @@ def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names:
     write_json(folder.summary, plan_summary(found, config.name, config.seed, build_tolerances(config)))
     folder.checkpoint.unlink(missing_ok=True)
     if config.output.figures:
-        from jffsr.viz.figures import save_figures
+        from jffsr.viz.save import save_figures
 
         save_figures(found.problem.robot, dataset, folder.figures)

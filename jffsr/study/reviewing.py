@@ -54,7 +54,7 @@ def check_run(path: str | Path, steps: tuple[float, ...] = (2e-3, 1e-3)):
 
 def redraw_run(path: str | Path) -> list[Path]:
     """Draw the figures of a finished run again and return their files."""
-    from jffsr.viz.figures import save_figures
+    from jffsr.viz.save import save_figures
 
     folder, problem, dataset = open_run(path)
     return save_figures(problem.robot, dataset, folder.figures)

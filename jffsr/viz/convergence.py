@@ -89,7 +89,7 @@ def _range(best: np.ndarray, accuracy: float) -> tuple[float, float]:
     low, high = min(marks), max(marks)
     if accuracy > 0:
         low = max(low, _DEPTH * accuracy)
-    pad = max((high / low) ** 0.15, 1.5)
+    pad = max((high / low) ** 0.15, 1.5, (11.0 * low / high) ** (2 / 3))  # at least a decade in all
     return low / pad, high * pad**0.5
 
 

@@ -10,9 +10,10 @@ from matplotlib.axes import Axes
 from jffsr.viz.style import GREY, SHADE
 
 # A limit that all curves share is drawn when it lies within this fraction of their range beyond them,
-_NEAR = 0.3
+_NEAR = 0.5
 # and one that only some have, when one of these comes as close as this: others would only be in the way.
 _CLOSE = 0.12
+_LONGEST = 32  # letters on a limit's line
 
 
 def frame_curves(
@@ -20,7 +21,8 @@ def frame_curves(
 ) -> bool:
     """Set the vertical range for `values` (N + 1, k) and draw the limits (k,) that are near; say if any was.
 
-    Infinite limits are none. A limit that not all k curves share is marked with the names of those that do.
+    Infinite limits are none. A limit that not all k curves share is marked with the names of those that do;
+    one that all share but none comes near is told in a corner instead of squashing the curves.
     """
     low, high = _range(values)
     span = high - low
@@ -45,7 +47,31 @@ def frame_curves(
         elif all(abs(level - other) > 0.11 * (high - low) for other in written):
             _write_holders(axes, level, holders, names)
             written.append(level)
+    _tell_far_limits(axes, np.asarray(lower), np.asarray(upper), levels)
     return bool(drawn)
+
+
+def _tell_far_limits(axes: Axes, lower: np.ndarray, upper: np.ndarray, drawn: list[float]) -> None:
+    both = np.concatenate([lower, upper])
+    if not np.all(np.isfinite(both)) or np.ptp(lower) > 0 or np.ptp(upper) > 0:
+        return
+    low, high = float(lower[0]), float(upper[0])
+    if low in drawn or high in drawn:
+        return
+    text = f"limit \N{PLUS-MINUS SIGN}{high:.3g}" if low == -high else f"limits {low:.3g} to {high:.3g}"
+    axes.annotate(
+        text,
+        (1.0, 1.0),
+        xycoords="axes fraction",
+        xytext=(-2, -1),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=6,
+        color="0.3",
+        zorder=1.5,
+        gid="far limit",
+    )
 
 
 def _peak(curve: np.ndarray, side: int) -> float:
@@ -66,10 +92,11 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 
 def _write_holders(axes: Axes, level: float, holders: list[str], names: Sequence[str]) -> None:
     places = [list(names).index(name) for name in holders]
-    consecutive = len(places) > 2 and places == list(range(places[0], places[-1] + 1))
-    text = f"{holders[0]} … {holders[-1]}" if consecutive else ", ".join(holders[:3])
-    if len(holders) > 3 and not consecutive:
-        text += ", …"
+    text = ", ".join(holders)
+    if len(holders) > 2 and places == list(range(places[0], places[-1] + 1)):
+        text = f"{holders[0]} … {holders[-1]}"
+    if len(holders) > 1 and len(text) > _LONGEST:
+        text = f"{holders[0]} and {len(holders) - 1} more"
     axes.annotate(
         text,
         (1.0, level),

@@ -104,7 +104,7 @@ def _draw_arm(axes, scene: Scene, sample: int, colour, order: int, size: int, la
 def _base_axes(scene: Scene) -> np.ndarray:
     """Ends (3, 3) of the axes of B at the end of the run."""
     faces = scene.base_faces[-1]
-    length = 0.75 * np.linalg.norm(faces - scene.base_position[-1], axis=-1).max()
+    length = 0.85 * np.linalg.norm(faces - scene.base_position[-1], axis=-1).max()
     return scene.base_position[-1] + length * scene.base_rotation[-1].T
 
 

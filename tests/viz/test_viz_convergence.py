@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from runs import run_dataset
+from viz_runs import run_dataset
 
 from jffsr.viz.convergence import draw_convergence
 
@@ -41,6 +41,7 @@ def test_odd_histories_can_be_drawn(best, phases):
     figure.canvas.draw()
     low, high = figure.axes[0].get_ylim()
     assert 0 < low < 1.0 < high
+    assert high / low >= 10
 
 
 def test_a_run_without_a_finite_value_says_so():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 import pytest
-from runs import run_dataset
+from viz_runs import run_dataset
 
 from jffsr.viz.base import draw_base
 from jffsr.viz.joints import draw_joints
@@ -58,6 +58,14 @@ def test_limit_of_some_joints_names_them():
     limits = np.deg2rad([20.0, 20.0, 20.0, 100.0, 100.0, 100.0])
     figure = draw_joints(run_dataset(rate_limit=limits))
     assert {text.get_text() for text in figure.axes[1].texts} == {"joint1 … joint3"}
+
+
+def test_limit_of_joints_with_long_names_stays_short():
+    names = [f"left_shoulder_pitch_{i}" for i in range(4)]
+    run = run_dataset(joints=names, rate_limit=np.deg2rad([20.0, 100.0, 20.0, 20.0]))
+    assert {text.get_text() for text in draw_joints(run).axes[1].texts} == {
+        "left_shoulder_pitch_0 and 2 more"
+    }
 
 
 @pytest.mark.parametrize("count", [1, 14])

@@ -6,12 +6,13 @@ import jax
 import numpy as np
 import pytest
 from motions import robot_from_record
-from runs import run_dataset
+from viz_runs import run_dataset
 
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.robots.state import State
+from jffsr.viz.convergence import draw_convergence
 from jffsr.viz.motion import draw_robot
-from jffsr.viz.save import save_figures
+from jffsr.viz.save import save_figure, save_figures
 from jffsr.viz.scene import base_box, scene_of
 
 
@@ -33,14 +34,14 @@ def test_scene_stands_where_the_kinematics_says(robots):
     run = run_dataset(joints=list(robot.joint_names))
     scene = scene_of(robot, run)
     sample = 17
-    with jax.disable_jit():
-        kin = kinematics(
-            robot,
-            State(
-                *(run[name].values[sample] for name in ("base_position", "base_quaternion", "joint_position"))
-            ),
-        )
-        tools = [end_effector_pose(robot, kin, name)[0] for name in robot.end_effector_names]
+    values = [run[name].values[sample] for name in ("base_position", "base_quaternion", "joint_position")]
+
+    @jax.jit
+    def expected(*values):
+        kin = kinematics(robot, State(*values))
+        return kin, [end_effector_pose(robot, kin, name)[0] for name in robot.end_effector_names]
+
+    kin, tools = expected(*values)
     np.testing.assert_allclose(scene.tools[sample], np.stack(tools), atol=1e-12)
     np.testing.assert_allclose(scene.joints[sample], kin.anchor, atol=1e-12)
     np.testing.assert_allclose(scene.base_faces[sample].mean(axis=(0, 1)), kin.base_position, atol=1e-12)
@@ -100,11 +101,11 @@ def test_files_are_written_whole(planar2, tmp_path):
         assert len(content) > 5000
 
 
-def test_a_figure_that_fails_leaves_no_file(planar2, tmp_path, monkeypatch):
+def test_a_figure_that_fails_leaves_no_file(tmp_path, monkeypatch):
     def fail(*args):
         raise OSError("disk full")
 
     monkeypatch.setattr("jffsr.viz.save.os.replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        save_figures(planar2, run_dataset(joints=2), tmp_path)
+        save_figure(draw_convergence(run_dataset()), tmp_path / "convergence")
     assert list(tmp_path.iterdir()) == []
