@@ -98,14 +98,17 @@ def _strongly_typed(x: Array) -> Array:
 
 
 def _advance(optimizer, problem, state, stop, length):
-    def one(state, _):
+    # A loop of one turn would be compiled as no loop, and round otherwise: it gets a second, idle one.
+    idle = np.arange(max(length, 2)) >= length
+
+    def one(state, idle):
         state = jax.lax.cond(
-            stop.reached(state.progress), lambda s: s, lambda s: optimizer.step(problem, s), state
+            stop.reached(state.progress) | idle, lambda s: s, lambda s: optimizer.step(problem, s), state
         )
         p = state.progress
         return state, (p.iteration, p.evaluations, p.gradient_evaluations, p.best_value)
 
-    return jax.lax.scan(one, state, length=length)
+    return jax.lax.scan(one, state, idle)
 
 
 _advance_jit = jax.jit(_advance, static_argnums=4)
