@@ -30,7 +30,9 @@ STUDIES = {
     "hu_2011_planar2": PLANAR.replace("START", "[10, 10]").replace("GOAL", "[20, 20]"),
     "ye_2019_planar3": PLANAR.replace("START", "[10, 10, 10]").replace("GOAL", "[20, 20, 20]"),
     "wu_2018_6dof": Path("configs/planning/composite_wu6.yaml").read_text().replace("wu_6dof", "ROBOT"),
-    "servicer_7dof": Path("configs/planning/composite_7dof.yaml").read_text().replace("servicer_7dof", "ROBOT"),
+    "servicer_7dof": Path("configs/planning/composite_7dof.yaml")
+    .read_text()
+    .replace("servicer_7dof", "ROBOT"),
 }
 SHARES = 10
 SECONDS = 5.0
@@ -88,7 +90,7 @@ def test_damaged_files_end_well(share, small, compiled, tmp_path, capsys):
         folder.mkdir()
         path = damaged(number, folder)
         # Every structure has to be compiled: without gradients, that is much cheaper.
-        kind = "optimizer.kind=hybrid" if number % 50 == 1 else "optimizer.kind=qpso"
+        kind = "optimizer.kind=hybrid" if number % 10 == 1 else "optimizer.kind=qpso"
         overrides = [*small, kind, "optimizer.evaluations=16"]
         arguments = ["run", str(path), *overrides, "--out", str(folder / "run")]
         seconds = SECONDS
