@@ -13,7 +13,7 @@ from jffsr.errors import InputError
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.plan import check_precision
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Tolerances, result_code
+from jffsr.planning.result import Tolerances, result_code, settled
 from jffsr.planning.verification import Verification, verify
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
@@ -77,23 +77,26 @@ def plan_many(
 @partial(jax.jit, static_argnums=(3, 4, 5))
 def _plan_batch(problems, optimizers, keys, lengths, step_factor, tolerances):
     def one(problem: Problem, key: Array) -> Plans:
-        population, evaluations, gradients = None, 0, 0
+        population, evaluations, gradients, best = None, 0, 0, []
         for index, ((optimizer, stop), length) in enumerate(zip(optimizers, lengths, strict=True)):
             state = optimizer.init(jax.random.fold_in(key, index), problem, population)
 
             def step(state, _, optimizer=optimizer, stop=stop):
                 done = stop.reached(state.progress)
                 following = optimizer.step(problem, state)
-                return jax.tree.map(lambda old, new: jnp.where(done, old, new), state, following), None
+                state = jax.tree.map(lambda old, new: jnp.where(done, old, new), state, following)
+                return state, state.progress.best_value
 
-            state, _ = jax.lax.scan(step, state, length=length)
+            state, values = jax.lax.scan(step, state, length=length)
+            best.append(values)
             evaluations += state.progress.evaluations
             gradients += state.progress.gradient_evaluations
             population = optimizer.population(state)
         free = state.progress.best_position
         motion, verification = verify(problem, free, step_factor)
+        ended = state.progress.converged | settled(jnp.concatenate(best))
         return Plans(
-            result=result_code(problem, verification, state.progress.converged, tolerances),
+            result=result_code(problem, verification, ended, tolerances),
             cost=state.progress.best_value,
             free=free,
             motion=motion,

@@ -16,7 +16,7 @@ from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Result, Tolerances, explain, result_code
+from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
 from jffsr.rollouts.motion import Motion
@@ -143,12 +143,9 @@ def solve(
 
 
 def _at_its_end(outcome: Outcome) -> bool:
-    """Whether the search had stopped improving: by its own word, or 1 % in the last tenth of its steps."""
-    if outcome.reason in ("converged", "target"):
-        return True
-    values = [record.best_value for record in outcome.history]
-    earlier = values[-1 - max(1, len(values) // 10)] if len(values) > 1 else np.inf
-    return bool(np.isfinite(earlier) and earlier - values[-1] <= 0.01 * abs(earlier))
+    """Whether the search had stopped improving, by its own word or by its last steps."""
+    values = np.array([record.best_value for record in outcome.history])
+    return outcome.reason in ("converged", "target") or bool(settled(values))
 
 
 def check_precision(precision: str) -> None:

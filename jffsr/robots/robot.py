@@ -87,7 +87,7 @@ class Limits:
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
     """A tree of rigid bodies on a free base.
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture acts by being here)
 
 from jffsr.errors import InputError
 from jffsr.study.config import dump_config, load_config
@@ -14,31 +15,6 @@ from jffsr.study.schema import PlanningConfig
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = sorted((ROOT / "configs" / "planning").glob("*.yaml"))
-
-GOOD = """\
-kind: planning
-robot: wu_6dof
-task:
-  start_deg: [0, 90]
-  goal_deg: [45, 3]
-  duration: 30
-"""
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def write(name, text):
-    Path(name).parent.mkdir(parents=True, exist_ok=True)
-    Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return name
-
-
-def load(text, *overrides):
-    return load_config(write("x.yaml", text), overrides)
 
 
 # --- what a good file gives ---
@@ -189,7 +165,7 @@ def test_the_five_scenarios_are_shipped():
     assert [path.stem for path in SHIPPED] == [*names, "composite_wu6_momentum", "composite_wu6_tight"]
 
 
-def test_names_under_configs_are_found(folder):
+def test_names_under_configs_are_found(folder):  # noqa: F811
     write("configs/planning/mine.yaml", GOOD)
     write("configs/other/twice.yaml", GOOD)
     write("configs/planning/twice.yaml", GOOD)
