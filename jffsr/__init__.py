@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 _HOME = {
     "InputError": "jffsr.errors",
     "Robot": "jffsr.robots.robot",
+    "Limits": "jffsr.robots.robot",
     "State": "jffsr.robots.state",
     "load_robot": "jffsr.robots.loading",
     "list_robots": "jffsr.robots.loading",
@@ -36,6 +37,10 @@ _HOME = {
     "minimize": "jffsr.optimizers.minimize",
     "Problem": "jffsr.planning.problem",
     "Plan": "jffsr.planning.plan",
+    "plan_many": "jffsr.planning.many",
+    "Settings": "jffsr.optimizers.registry",
+    "composite_index": "jffsr.objectives.composite",
+    "solve": "jffsr.planning.plan",
     "plan": "jffsr.study.planning",
 }
 

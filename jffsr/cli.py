@@ -122,6 +122,10 @@ def _run(arguments: argparse.Namespace) -> int:
         return INTERRUPTED
     if run.already_finished:
         print(f"{run.folder.path} is finished:\n")
+    elif config.output.figures:
+        from jffsr.viz.run import draw_run
+
+        draw_run(run.folder.path)
     print(summary_text(run.summary))
     print(f"  folder        {run.folder.path}")
     return MET if run.summary["result"]["code"] == 0 else NOT_MET
@@ -138,11 +142,11 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace) -> int:
     _prepare_jax()
-    from jffsr.study.reviewing import redraw_run
     from jffsr.study.run_folder import RunFolder
     from jffsr.study.summary import summary_text
+    from jffsr.viz.run import draw_run
 
-    files = redraw_run(arguments.run)
+    files = draw_run(arguments.run)
     summary = RunFolder(Path(arguments.run)).read_summary()
     print(summary_text(summary))
     print("  figures       " + "\n                ".join(str(file) for file in files))

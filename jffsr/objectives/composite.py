@@ -32,7 +32,6 @@ from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Scalar
 
-
 DEFAULT_ATTITUDE_SCALE = np.deg2rad(0.1)
 
 
@@ -81,7 +80,7 @@ def composite_index(
     initial_quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0),
     goal_quaternion: Sequence[float] | None = None,
     excursion_limit: Sequence[float] | float | None = None,
-    attitude_change: float | None | str = "default",
+    attitude_change: float | str | None = "default",
     joint_rate: float | None = 0.01,
     joint_acceleration: float | None = 0.01,
     attitude_excursion: float | None = 0.01,

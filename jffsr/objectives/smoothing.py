@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from jffsr.spatial.safe import safe_norm, smooth_hinge, smooth_max, smooth_norm
+from jffsr.spatial.safe import peak, safe_norm, smooth_hinge, smooth_max, smooth_norm
 from jffsr.types import Array, Scalar
 
 
@@ -37,14 +37,14 @@ def overrun(values: Array, limit: Array) -> Scalar:
 
     values (K, c) over time; limit (c,), infinite where there is none.
     """
-    return jnp.sum(jnp.maximum(0.0, jnp.max(jnp.abs(values), axis=0) / limit - 1))
+    return jnp.sum(jnp.maximum(0.0, peak(jnp.abs(values)) / limit - 1))
 
 
 def smooth_overrun(values: Array, limit: Array, smoothing: Smoothing) -> Scalar:
     """The same with a log-sum-exp peak, which is never below the true one, and a softplus hinge."""
     ratio = values / limit
-    peak = smooth_max(jnp.concatenate([ratio, -ratio]), smoothing.peak)
-    return jnp.sum(smooth_hinge(peak - 1, smoothing.overrun))
+    largest = smooth_max(jnp.concatenate([ratio, -ratio]), smoothing.peak)
+    return jnp.sum(smooth_hinge(largest - 1, smoothing.overrun))
 
 
 def error_norm(error: Array) -> Scalar:

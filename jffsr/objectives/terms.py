@@ -29,6 +29,7 @@ from jffsr.spatial.rotation import (
     quaternion_multiply,
     quaternion_to_euler_zxy,
     quaternion_to_rotation_vector,
+    rounded_rotation_vector,
 )
 from jffsr.types import Array, Quaternion, Scalar, Vector
 
@@ -50,12 +51,25 @@ class Term(Protocol):
 def attitude_angles(motion: Motion, measure: str) -> Array:
     """Attitude angles (N + 1, 3), rad, of the base relative to its start.
 
-    The rotation vector of R(0)' R(t), or, as the paper has it, angles about z, x and y of that rotation.
+    The rotation vector of R(0)' R(t), or, as the paper has it, angles about z, x and y of that rotation;
+    the columns are about x, y, z either way.
     """
+    relative = _relative_to_start(motion)
+    if measure == EULER_ZXY:
+        return quaternion_to_euler_zxy(relative)[..., jnp.array([1, 2, 0])]
+    return quaternion_to_rotation_vector(relative)
+
+
+def _relative_to_start(motion: Motion) -> Quaternion:
     q = motion.base_quaternion
-    relative = quaternion_multiply(quaternion_conjugate(q[:1]), q)
-    chart = quaternion_to_euler_zxy if measure == EULER_ZXY else quaternion_to_rotation_vector
-    return chart(relative)
+    return quaternion_multiply(quaternion_conjugate(q[:1]), q)
+
+
+def _smooth_attitude_angles(motion: Motion, measure: str, width: Scalar) -> Array:
+    """The same but for a rotation vector rounded off at 180 degrees, where its length has a ridge."""
+    if measure == EULER_ZXY:
+        return attitude_angles(motion, measure)
+    return rounded_rotation_vector(_relative_to_start(motion), width)
 
 
 @jax.tree_util.register_dataclass
@@ -73,7 +87,9 @@ class AttitudeChange:
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
         """The smooth form."""
-        return smooth_error_norm(attitude_angles(motion, self.measure)[-1], self.scale, smoothing)
+        width = smoothing.norm * self.scale
+        angles = _smooth_attitude_angles(motion, self.measure, width / 2)
+        return smooth_error_norm(angles[-1], self.scale, smoothing)
 
 
 @jax.tree_util.register_dataclass
@@ -128,7 +144,8 @@ class AttitudeExcursion:
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
         """The smooth form."""
-        return smooth_overrun(attitude_angles(motion, self.measure), self.limit, smoothing)
+        angles = _smooth_attitude_angles(motion, self.measure, smoothing.peak)
+        return smooth_overrun(angles, self.limit, smoothing)
 
 
 @jax.tree_util.register_dataclass

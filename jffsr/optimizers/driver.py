@@ -88,18 +88,27 @@ class Outcome:
 
 @jax.jit
 def _init(optimizer, problem, key, population):
-    return optimizer.init(key, problem, population)
+    # A step gives back strongly typed numbers: a weakly typed start would compile the first chunk on its own.
+    return jax.tree.map(_strongly_typed, optimizer.init(key, problem, population))
+
+
+def _strongly_typed(x: Array) -> Array:
+    is_key = jax.dtypes.issubdtype(x.dtype, jax.dtypes.prng_key)
+    return x if is_key else jax.lax.convert_element_type(x, x.dtype)
 
 
 def _advance(optimizer, problem, state, stop, length):
-    def one(state, _):
+    # A loop of one turn would be compiled as no loop, and round otherwise: it gets a second, idle one.
+    idle = np.arange(max(length, 2)) >= length
+
+    def one(state, idle):
         state = jax.lax.cond(
-            stop.reached(state.progress), lambda s: s, lambda s: optimizer.step(problem, s), state
+            stop.reached(state.progress) | idle, lambda s: s, lambda s: optimizer.step(problem, s), state
         )
         p = state.progress
         return state, (p.iteration, p.evaluations, p.gradient_evaluations, p.best_value)
 
-    return jax.lax.scan(one, state, length=length)
+    return jax.lax.scan(one, state, idle)
 
 
 _advance_jit = jax.jit(_advance, static_argnums=4)
@@ -118,7 +127,8 @@ def run(
 ) -> Outcome:
     """Run the phases one after another and return the best point found.
 
-    `on_chunk` sees a snapshot after every chunk, from which `resume` goes on to the same bits. `interrupted` is asked between chunks.
+    `on_chunk` sees a snapshot after every chunk, from which `resume` goes on to the same bits.
+    `interrupted` is asked between chunks.
     """
     if not phases:
         raise InputError("there is no phase to run")
@@ -130,7 +140,7 @@ def run(
         before = _evaluations_before(history, index)
         if state is None:
             state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
-        while not bool(phase.stop.reached(state.progress)):
+        while not phase.stop.reached(jax.device_get(state.progress)):
             if interrupted():
                 return _outcome(phase, state, history, "interrupted")
             last = int(state.progress.iteration)

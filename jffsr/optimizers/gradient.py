@@ -5,7 +5,7 @@ search is that of Lewis and Overton (2013): a trial that does not decrease the o
 from above, one that still descends steeply bounds it from below, any other is accepted and asks optax for the
 next direction. So the batch never waits for the longest line search, the compiled program holds the gradient
 once, and the count of evaluations is exact. Points are judged by the true objective; a start is never made
-worse.
+worse, and one without a finite value and gradient is drawn again, uniform in the box.
 """
 
 from __future__ import annotations
@@ -61,8 +61,9 @@ class Descent:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class GradientState:
-    """A batch of descents, leading axis (k,), and the progress of all."""
+    """key; a batch of descents, leading axis (k,), and the progress of all."""
 
+    key: Array
     descent: Descent
     progress: Progress
 
@@ -93,12 +94,18 @@ class GradientDescent:
     def init(
         self, key: Array, problem: OptimizationProblem, population: Population | None = None
     ) -> GradientState:
-        """The starts; nothing is evaluated yet: the first trial is at the start itself, a step of zero."""
+        """The starts; nothing is evaluated yet: the first trial is at the start itself, a step of zero.
+
+        A given population keeps its values: the trials stand off the bounds, and may be worse or not finite.
+        """
+        key, draw = jax.random.split(key)
         if population is None:
-            positions = sample_box(key, problem, self.starts)
+            positions = sample_box(draw, problem, self.starts)
+            values = jnp.full(self.starts, jnp.inf)
         else:
-            order = jnp.argsort(finite_or_inf(population.values))[: self.starts]
-            positions = population.positions[order]
+            values = finite_or_inf(population.values)
+            order = jnp.argsort(values)[: self.starts]
+            positions, values = population.positions[order], values[order]
         lower, upper = problem.bounds()
         points = jax.vmap(lambda x: from_box(x, lower, upper))(positions)
         count = points.shape[0]
@@ -114,18 +121,9 @@ class GradientDescent:
             stalled=jnp.zeros(count, dtype=int),
             active=jnp.ones(count, dtype=bool),
             best_position=positions,
-            best_value=jnp.full(count, jnp.inf),
+            best_value=values,
         )
-        progress = no_progress(positions[0])
-        if population is not None:
-            best_position, best_value = better_of(
-                progress.best_position,
-                progress.best_value,
-                population.positions,
-                finite_or_inf(population.values),
-            )
-            progress = replace(progress, best_position=best_position, best_value=best_value)
-        return GradientState(descent, progress)
+        return GradientState(key, descent, replace(no_progress(positions[0]), best_value=values[0]))
 
     def _evaluate(self, problem: OptimizationProblem, points: Array) -> tuple[Array, Array, Array]:
         """Smooth values, true values and gradients of a batch of unconstrained points."""
@@ -151,11 +149,10 @@ class GradientDescent:
         inside = jax.vmap(lambda z: to_box(z, lower, upper))(trial)
         advanced = jax.vmap(self._advance)(descent, trial, smooth, gradient)
         improved = descent.active & (value < descent.best_value)
-        advanced = jax.tree.map(
-            lambda new, old: jnp.where(descent.active.reshape((-1,) + (1,) * (new.ndim - 1)), new, old),
-            advanced,
-            descent,
-        )
+        lost = ~jnp.isfinite(descent.smooth) & ~jnp.isfinite(smooth)
+        fresh = sample_box(jax.random.fold_in(state.key, progress.iteration), problem, trial.shape[0])
+        again = replace(descent, point=jax.vmap(lambda x: from_box(x, lower, upper))(fresh))
+        advanced = _select(descent.active, _select(lost, again, advanced), descent)
         advanced = replace(
             advanced,
             best_position=jnp.where(improved[:, None], inside, descent.best_position),
@@ -172,7 +169,7 @@ class GradientDescent:
             gradient_evaluations=progress.gradient_evaluations + jnp.sum(descent.active),
             converged=~jnp.any(advanced.active),
         )
-        return GradientState(advanced, progress)
+        return GradientState(state.key, advanced, progress)
 
     def _advance(self, old: Descent, trial: Vector, smooth: Scalar, gradient: Vector) -> Descent:
         """One start after its trial: the next direction, or another step along the old one."""
@@ -180,7 +177,7 @@ class GradientDescent:
         direction = -update
         if self.method == ADAM:
             accepted, too_short, too_long = jnp.isfinite(smooth), old.too_short, old.too_long
-            another = first = jnp.full_like(old.length, self.learning_rate)
+            another, first = old.length / 2, jnp.full_like(old.length, self.learning_rate)
         else:
             slope = jnp.vdot(old.gradient, old.direction)
             floor = _ROUNDING * (1 + jnp.abs(old.smooth))
@@ -231,3 +228,8 @@ class GradientDescent:
     def population(self, state: GradientState) -> Population:
         """The best point of each start."""
         return Population(state.descent.best_position, state.descent.best_value)
+
+
+def _select(which: Array, yes: Descent, no: Descent) -> Descent:
+    """For each start (k,) the one or the other."""
+    return jax.tree.map(lambda a, b: jnp.where(which.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), yes, no)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +16,7 @@ from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Result, Tolerances, explain, result_code
+from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
 from jffsr.rollouts.motion import Motion
@@ -48,6 +49,24 @@ class Plan:
     def first_at(self, value: float) -> Record | None:
         """The first record of the history whose best value is at most `value`."""
         return next((record for record in self.history if record.best_value <= value), None)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion as CSV; see `jffsr.planning.export.to_csv`."""
+        from jffsr.planning.export import to_csv
+
+        to_csv(self, path)
+
+    def to_mat(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion for MATLAB or Octave; see `jffsr.planning.export.to_mat`."""
+        from jffsr.planning.export import to_mat
+
+        to_mat(self, path)
+
+    def joint_table(self, period: float) -> dict[str, np.ndarray]:
+        """Joint motion every `period` s; see `jffsr.planning.export.joint_table`."""
+        from jffsr.planning.export import joint_table
+
+        return joint_table(self, period)
 
 
 class SearchInterrupted(Exception):
@@ -86,7 +105,7 @@ def solve(
     """
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
-    _check_precision(precision)
+    check_precision(precision)
     with Stopwatch() as watch:
         outcome = run(
             build_phases(optimizer, settings),
@@ -124,15 +143,13 @@ def solve(
 
 
 def _at_its_end(outcome: Outcome) -> bool:
-    """Whether the search had stopped improving: by its own word, or 1 % in the last tenth of its steps."""
-    if outcome.reason in ("converged", "target"):
-        return True
-    values = [record.best_value for record in outcome.history]
-    earlier = values[-1 - max(1, len(values) // 10)] if len(values) > 1 else np.inf
-    return bool(np.isfinite(earlier) and earlier - values[-1] <= 0.01 * abs(earlier))
+    """Whether the search had stopped improving, by its own word or by its last steps."""
+    values = np.array([record.best_value for record in outcome.history])
+    return outcome.reason in ("converged", "target") or bool(settled(values))
 
 
-def _check_precision(precision: str) -> None:
+def check_precision(precision: str) -> None:
+    """Refuse to plan in float64 while JAX's 64-bit floats are off."""
     if precision == "float64" and not jax.config.jax_enable_x64:
         raise InputError(
             "planning needs float64: call jax.config.update('jax_enable_x64', True) first "

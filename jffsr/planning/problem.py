@@ -21,7 +21,7 @@ def _at_rest_at_origin() -> State:
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """Choose the free numbers of `trajectory` so that the index of the motion is least.
 

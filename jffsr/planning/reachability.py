@@ -32,21 +32,25 @@ def check_duration_possible(
         return
     sentences = []
     for i in np.flatnonzero(least >= 0.999 * least.max()):
-        unit, turn = (
-            ("m", goal[i] - start[i]) if _slides(robot, i) else ("deg", np.rad2deg(goal[i] - start[i]))
+        slides = robot.topology.joint_types[i] == PRISMATIC
+        distance = abs(goal[i] - start[i])
+        moved = f"{distance:.4g} m" if slides else f"{np.rad2deg(distance):.4g} deg"
+        needs = _needs(
+            distance, robot.limits.velocity[i], robot.limits.acceleration[i], "m" if slides else "rad"
         )
-        per = "m" if _slides(robot, i) else "rad"
-        rate, acceleration = robot.limits.velocity[i], robot.limits.acceleration[i]
-        alone = 2 * np.sqrt(abs(goal[i] - start[i]) / acceleration) if np.isfinite(acceleration) else 0.0
-        sentences.append(
-            f"{robot.joint_names[i]} moves {abs(turn):.4g} {unit} from rest to rest, which needs {alone:.2f} s under "
-            f"its acceleration limit of {acceleration:.4g} {per}/s^2 alone and {least[i]:.2f} s with its rate limit "
-            f"of {rate:.4g} {per}/s as well"
-        )
+        sentences.append(f"{robot.joint_names[i]} moves {moved} from rest to rest, which needs {needs}")
     raise InputError(
         f"{where}: found {duration:g} s, at least {least.max():.2f} s is needed: " + "; ".join(sentences)
     )
 
 
-def _slides(robot: Robot, joint: int) -> bool:
-    return robot.topology.joint_types[joint] == PRISMATIC
+def _needs(distance: float, rate: float, acceleration: float, unit: str) -> str:
+    """The least time under each of the limits that there are, and under both."""
+    of_rate = f"its rate limit of {rate:.4g} {unit}/s"
+    if np.isinf(acceleration):
+        return f"{distance / rate:.2f} s under {of_rate}"
+    alone = 2 * np.sqrt(distance / acceleration)
+    text = f"{alone:.2f} s under its acceleration limit of {acceleration:.4g} {unit}/s^2"
+    if np.sqrt(distance * acceleration) <= rate:
+        return text
+    return f"{text} alone and {distance / rate + rate / acceleration:.2f} s with {of_rate} as well"

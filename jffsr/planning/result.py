@@ -67,6 +67,15 @@ def result_code(
     return jnp.where(finite, code, ResultCode.NOT_FINITE).astype(jnp.int32)
 
 
+def settled(best_values: Array) -> Array:
+    """Whether the last tenth of a search's steps (K,) bettered its index by no more than 1 %."""
+    steps = best_values.shape[0]
+    if steps < 2:
+        return jnp.array(False)
+    earlier, last = best_values[-1 - max(1, steps // 10)], best_values[-1]
+    return jnp.isfinite(earlier) & (earlier - last <= 0.01 * jnp.abs(earlier))
+
+
 _KINDS = ("position", "rate", "acceleration", "excursion")
 
 

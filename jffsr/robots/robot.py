@@ -72,9 +72,22 @@ class Limits:
     acceleration: Array
     torque: Array
 
+    @classmethod
+    def symmetric(
+        cls,
+        num_joints: int,
+        position: float = np.inf,
+        velocity: float = np.inf,
+        acceleration: float = np.inf,
+        torque: float = np.inf,
+    ) -> Limits:
+        """The same limits for every joint, positions in [-position, position]."""
+        bounds = (-position, position, velocity, acceleration, torque)
+        return cls(*(np.full(num_joints, float(bound)) for bound in bounds))
+
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
     """A tree of rigid bodies on a free base.
 

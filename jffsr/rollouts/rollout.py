@@ -17,10 +17,10 @@ from jffsr.rollouts.joint_terms import (
     add,
     cross,
     dot,
-    symmetric_times,
     joint_terms,
     rows_times,
     subtract,
+    symmetric_times,
 )
 from jffsr.rollouts.motion import JointGrid, Motion, sample_joints
 from jffsr.trajectories.interface import Trajectory

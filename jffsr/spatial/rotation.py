@@ -85,9 +85,22 @@ def quaternion_to_rotation_vector(q: Quaternion) -> Vector3:
     Smooth at zero rotation. At 180 degrees the vector jumps between two opposite values, as any such
     chart must; value and gradient are those of one side.
     """
+    q = jnp.where(q[..., :1] < 0, -q, q)
+    return _rotation_vector(q[..., :1], q[..., 1:])
+
+
+def rounded_rotation_vector(q: Quaternion, width: Array) -> Vector3:
+    """Rotation vector (..., 3), rad, whose length is rounded off where it peaks, at 180 degrees.
+
+    Over a width of the half angle, rad; 180 degrees give pi - 2 width. The sign jumps there as before, so
+    what does not depend on the sign, such as the length, is differentiable at every rotation.
+    """
+    q = jnp.where(q[..., :1] < 0, -q, q)
     w = q[..., :1]
-    q = jnp.where(w < 0, -q, q)
-    w, v = q[..., :1], q[..., 1:]
+    return _rotation_vector(jnp.sqrt(w * w + width**2), q[..., 1:])
+
+
+def _rotation_vector(w: Array, v: Vector3) -> Vector3:
     squared = jnp.sum(v * v, axis=-1, keepdims=True)
     small = squared < _SMALL_SQUARED
     length = jnp.sqrt(jnp.where(small, 1.0, squared))

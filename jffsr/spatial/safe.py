@@ -26,6 +26,23 @@ def safe_atan2(y: Array, x: Array) -> Array:
     return jnp.where(origin, 0.0, jnp.arctan2(y, jnp.where(origin, 1.0, x)))
 
 
+@jax.custom_jvp
+def peak(x: Array) -> Array:
+    """Largest value along the first axis; the gradient goes to the first place that holds it.
+
+    The gradient of `jnp.max` looks for the places that equal the maximum: a compiler that computes x twice,
+    rounded differently, leaves none, and the gradient is NaN.
+    """
+    return jnp.max(x, axis=0)
+
+
+@peak.defjvp
+def _peak_jvp(primals, tangents):
+    (x,), (x_dot,) = primals, tangents
+    place = jnp.argmax(x, axis=0)[None]
+    return peak(x), jnp.take_along_axis(x_dot, place, axis=0)[0]
+
+
 def smooth_norm(x: Array, width: float, axis: int = -1) -> Array:
     """Norm rounded off within `width` of zero: sqrt(|x|^2 + width^2) - width, which tends to |x|."""
     return jnp.sqrt(jnp.sum(x * x, axis=axis) + width**2) - width

@@ -38,7 +38,8 @@ def save_checkpoint(path: Path, snapshot: Snapshot) -> None:
 def load_checkpoint(path: Path, phases: list[Phase], problem: OptimizationProblem, key: Array) -> Snapshot:
     """Read a snapshot of these phases; InputError where the file is damaged or of another search."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        # Opened here, because NumPy leaves a damaged file open.
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
             head = json.loads(file["head"].tobytes())
             history = file["history"]
             leaves = [file[f"leaf{i}"] for i in range(head["leaves"])]

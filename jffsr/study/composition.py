@@ -15,9 +15,9 @@ from typing import Any
 from jffsr.errors import InputError
 from jffsr.reading.did_you_mean import hint
 from jffsr.reading.files import read_text
-from jffsr.study.lookup import shown, with_suffixes
 from jffsr.reading.sources import Sources
 from jffsr.reading.yaml_lines import Document, Key, Mark, parse
+from jffsr.study.lookup import shown, with_suffixes
 
 MAX_FILES = 50
 MAX_LEVELS = 10

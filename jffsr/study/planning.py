@@ -120,12 +120,7 @@ def run_planning(
 
 
 def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str]) -> None:
-    """Write the arrays, then the summary, which marks the run as finished, then the figures."""
-    dataset = plan_dataset(found, config.name, phase_names)
-    save_dataset(dataset, folder.result)
+    """Write the arrays, then the summary, which marks the run as finished."""
+    save_dataset(plan_dataset(found, config.name, phase_names), folder.result)
     write_json(folder.summary, plan_summary(found, config.name, config.seed, build_tolerances(config)))
     folder.checkpoint.unlink(missing_ok=True)
-    if config.output.figures:
-        from jffsr.viz.figures import save_figures
-
-        save_figures(found.problem.robot, dataset, folder.figures)

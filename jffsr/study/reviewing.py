@@ -1,4 +1,4 @@
-"""Looking at a finished run again: the cross-check with MuJoCo and MJX, and its figures."""
+"""Looking at a finished run again, and its cross-check with MuJoCo and MJX."""
 
 from __future__ import annotations
 
@@ -50,11 +50,3 @@ def check_run(path: str | Path, steps: tuple[float, ...] = (2e-3, 1e-3)):
     summary["verification"]["mujoco"] = report.to_dict()
     write_json(folder.summary, summary)
     return report
-
-
-def redraw_run(path: str | Path) -> list[Path]:
-    """Draw the figures of a finished run again and return their files."""
-    from jffsr.viz.figures import save_figures
-
-    folder, problem, dataset = open_run(path)
-    return save_figures(problem.robot, dataset, folder.figures)

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 from pydantic import PrivateAttr, model_validator
 
 from jffsr.errors import InputError
-from jffsr.study.schema_objective import TERMS, Objective
-from jffsr.study.schema_solver import Optimizer, Output, Rollout, Trajectory, Verification
-from jffsr.study.schema_task import Limits, Task
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
+from jffsr.study.schema_objective import TERMS, Objective
+from jffsr.study.schema_solver import Optimizer, Output, Rollout, Trajectory, Verification
+from jffsr.study.schema_task import Limits, Task
 
 NAME = r"(?!\.+\Z)[A-Za-z0-9_.-]{1,100}"  # also the name of a folder, so not . or ..
 

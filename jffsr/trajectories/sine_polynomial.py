@@ -29,7 +29,7 @@ _ON_LIMIT = 1e-9
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SinePolynomial:
     """Rest-to-rest joint motion inside position limits, with two free numbers per joint.
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture acts by being here)
 
 from jffsr.errors import InputError
 from jffsr.study.config import dump_config, load_config
@@ -15,31 +16,6 @@ from jffsr.study.schema import PlanningConfig
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = sorted((ROOT / "configs" / "planning").glob("*.yaml"))
 
-GOOD = """\
-kind: planning
-robot: wu_6dof
-task:
-  start_deg: [0, 90]
-  goal_deg: [45, 3]
-  duration: 30
-"""
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def write(name, text):
-    Path(name).parent.mkdir(parents=True, exist_ok=True)
-    Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return name
-
-
-def load(text, *overrides):
-    return load_config(write("x.yaml", text), overrides)
-
 
 # --- what a good file gives ---
 
@@ -47,10 +23,12 @@ def load(text, *overrides):
 def test_defaults_are_those_of_the_schema():
     config = load(GOOD)
     assert (config.name, config.robot, config.seed, config.precision) == ("x", "wu_6dof", 0, "float64")
-    assert config.optimizer.kind == "hybrid" and config.optimizer.contraction == (1.0, 0.5)
+    assert config.optimizer.kind == "hybrid"
+    assert config.optimizer.contraction == (1.0, 0.5)
     assert config.objective.attitude_change.scale_si == math.radians(0.1)
     assert config.trajectory.box == math.pi
-    assert config.limits.rate_si is None and config.limits.base_excursion_si is None
+    assert config.limits.rate_si is None
+    assert config.limits.base_excursion_si is None
     # No limit to the excursion is given, so that its term does not count.
     assert config.enabled_terms == ("attitude_change", "joint_rate", "joint_acceleration")
 
@@ -76,9 +54,11 @@ def test_a_limit_for_another_number_of_joints_is_refused_with_its_line():
 
 
 def test_duration_is_given_or_free():
-    assert load(GOOD).task.duration_range == (30.0, 30.0) and not load(GOOD).task.duration_is_free
+    assert load(GOOD).task.duration_range == (30.0, 30.0)
+    assert not load(GOOD).task.duration_is_free
     free = load(GOOD.replace("30", "{min: 10, max: 40}")).task
-    assert free.duration_range == (10.0, 40.0) and free.duration_is_free
+    assert free.duration_range == (10.0, 40.0)
+    assert free.duration_is_free
 
 
 def test_a_goal_attitude_turns_one_term_on_and_another_off():
@@ -99,7 +79,8 @@ def test_numbers_as_people_write_them(written, read):
 
 def test_whole_numbers_may_have_an_exponent_and_switches_may_say_no():
     config = load(GOOD + "optimizer: {evaluations: 2e4}\noutput: {figures: no}\n")
-    assert config.optimizer.evaluations == 20000 and type(config.optimizer.evaluations) is int
+    assert config.optimizer.evaluations == 20000
+    assert type(config.optimizer.evaluations) is int
     assert config.output.figures is False
 
 
@@ -139,10 +120,12 @@ def test_overrides_win_in_order():
         "name='1e-3'",
         "objective.terms=[{call: a.b}]",
     )
-    assert config.seed == 6 and config.optimizer.particles == 64
+    assert config.seed == 6
+    assert config.optimizer.particles == 64
     assert config.task.goal_deg == (10.0, 2.0)
     assert config.task.duration_range == (1.0, 2.0)
-    assert config.name == "1e-3" and config.objective.terms[0].call == "a.b"
+    assert config.name == "1e-3"
+    assert config.objective.terms[0].call == "a.b"
 
 
 def test_a_robot_file_is_found_relative_to_the_file_that_names_it():
@@ -170,9 +153,11 @@ def test_where_gives_the_line_of_a_key_of_its_section_or_its_override():
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_shipped_configurations_load_by_name_and_reload_as_equals(path):
     config = load_config(path.stem)
-    assert config == load_config(path) and config.name == path.stem
+    assert config == load_config(path)
+    assert config.name == path.stem
     again = load_config(write("run/config.yaml", dump_config(config)))
-    assert again == config and dump_config(again) == dump_config(config)
+    assert again == config
+    assert dump_config(again) == dump_config(config)
 
 
 def test_the_five_scenarios_are_shipped():
@@ -180,7 +165,7 @@ def test_the_five_scenarios_are_shipped():
     assert [path.stem for path in SHIPPED] == [*names, "composite_wu6_momentum", "composite_wu6_tight"]
 
 
-def test_names_under_configs_are_found(folder):
+def test_names_under_configs_are_found(folder):  # noqa: F811
     write("configs/planning/mine.yaml", GOOD)
     write("configs/other/twice.yaml", GOOD)
     write("configs/planning/twice.yaml", GOOD)
@@ -207,15 +192,18 @@ name: "12"
 """
     config = load(GOOD.replace("30", "{min: 10, max: 40}") + extra)
     again = load_config(write("config.yaml", dump_config(config)))
-    assert again == config and isinstance(again, PlanningConfig)
+    assert again == config
+    assert isinstance(again, PlanningConfig)
     assert again != load(GOOD)
 
 
 def test_the_written_form_is_readable_and_complete():
     text = dump_config(load(GOOD))
-    assert "  start_deg: [0.0, 90.0]\n" in text and "start:" not in text
+    assert "  start_deg: [0.0, 90.0]\n" in text
+    assert "start:" not in text
     assert "  scale_deg: 0.1\n" in text.replace("    ", "  ")
-    assert "seed: 0\n" in text and "learning_rate: 0.05\n" in text
+    assert "seed: 0\n" in text
+    assert "learning_rate: 0.05\n" in text
 
 
 def test_importing_the_configuration_imports_no_heavy_package():

@@ -1,44 +1,20 @@
 """Bad configurations: the one sentence for every kind of mistake, and hostile files."""
 
 import os
-from pathlib import Path
 
 import pytest
+from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture acts by being here)
 
 from jffsr.errors import InputError
 from jffsr.study.config import load_config
-
-GOOD = """\
-kind: planning
-robot: wu_6dof
-task:
-  start_deg: [0, 90]
-  goal_deg: [45, 3]
-  duration: 30
-"""
-
-
-@pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-def write(name, text):
-    Path(name).parent.mkdir(parents=True, exist_ok=True)
-    Path(name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return name
-
-
-def load(text, *overrides):
-    return load_config(write("x.yaml", text), overrides)
 
 
 def message(text, *overrides):
     with pytest.raises(InputError) as caught:
         load(text, *overrides)
     sentence = str(caught.value)
-    assert "\n" not in sentence and len(sentence) < 600
+    assert "\n" not in sentence
+    assert len(sentence) < 600
     return sentence
 
 
