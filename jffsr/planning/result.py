@@ -69,6 +69,7 @@ def result_code(
 
 def settled(best_values: Array) -> Array:
     """Whether the last tenth of a search's steps (K,) bettered its index by no more than 1 %."""
+    best_values = jnp.asarray(best_values)
     steps = best_values.shape[0]
     if steps < 2:
         return jnp.array(False)
