@@ -1,4 +1,4 @@
-"""A plan as tables for other tools: CSV, MATLAB, and joint positions at equal times."""
+"""A motion as tables for other tools: CSV, MATLAB, and joint positions at equal times."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.planning.plan import Plan
+from jffsr.robots.robot import Robot
+from jffsr.rollouts.motion import Motion
+from jffsr.trajectories.interface import Trajectory
 
 
-def joint_table(plan: Plan, period: float) -> dict[str, np.ndarray]:
+def joint_table(trajectory: Trajectory, duration: float, period: float) -> dict[str, np.ndarray]:
     """Joint motion every `period` s, as a controller wants it.
 
     time (K,), joint_position, joint_velocity and joint_acceleration (K, n); the last sample is the end of the
     motion, also where it is not a whole number of periods away.
     """
-    duration = float(plan.motion.time[-1])
     if not (np.isfinite(period) and 0 < period <= duration):
         raise InputError(f"period is {period:g} s; a number in (0, {duration:g}] is expected")
     time = np.arange(0.0, duration, period)
     if duration - time[-1] < 1e-9 * duration:
         time = time[:-1]
     time = np.append(time, duration)
-    position, velocity, acceleration = jax.device_get(jax.vmap(plan.trajectory)(jnp.asarray(time)))
+    position, velocity, acceleration = jax.device_get(jax.vmap(trajectory)(jnp.asarray(time)))
     return {
         "time": time,
         "joint_position": position,
@@ -36,12 +37,11 @@ def joint_table(plan: Plan, period: float) -> dict[str, np.ndarray]:
     }
 
 
-def to_csv(plan: Plan, path: str | os.PathLike[str]) -> None:
+def to_csv(robot: Robot, motion: Motion, path: str | os.PathLike[str]) -> None:
     """The motion as CSV, a row a sample: time, base position, base quaternion, joint positions and rates.
 
     Units are in the head of each column.
     """
-    motion, robot = plan.motion, plan.problem.robot
     units = {"revolute": "rad", "prismatic": "m"}
     of = [units[kind] for kind in robot.topology.joint_types]
     head = ["time [s]", *(f"base_{axis} [m]" for axis in "xyz"), *(f"base_q{part}" for part in "wxyz")]
@@ -60,11 +60,10 @@ def to_csv(plan: Plan, path: str | os.PathLike[str]) -> None:
         writer.writerows([repr(float(x)) for x in row] for row in np.concatenate(columns, axis=1))
 
 
-def to_mat(plan: Plan, path: str | os.PathLike[str]) -> None:
+def to_mat(robot: Robot, motion: Motion, cost: float, path: str | os.PathLike[str]) -> None:
     """The motion as a MATLAB 5 file: arrays under the names of Motion's fields, and joint_names."""
     from scipy.io import savemat
 
-    motion = plan.motion
     names = (
         "time",
         "base_position",
@@ -76,6 +75,6 @@ def to_mat(plan: Plan, path: str | os.PathLike[str]) -> None:
         "momentum",
     )
     values = {name: np.asarray(getattr(motion, name)) for name in names}
-    values["joint_names"] = np.array(plan.problem.robot.joint_names, dtype=object)
-    values["index"] = float(plan.cost)
+    values["joint_names"] = np.array(robot.joint_names, dtype=object)
+    values["index"] = float(cost)
     savemat(Path(path), values)

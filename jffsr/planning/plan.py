@@ -15,6 +15,7 @@ from jffsr.errors import InputError
 from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
 from jffsr.planning.stopwatch import Stopwatch
@@ -52,21 +53,15 @@ class Plan:
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the motion as CSV; see `jffsr.planning.export.to_csv`."""
-        from jffsr.planning.export import to_csv
-
-        to_csv(self, path)
+        to_csv(self.problem.robot, self.motion, path)
 
     def to_mat(self, path: str | os.PathLike[str]) -> None:
         """Write the motion for MATLAB or Octave; see `jffsr.planning.export.to_mat`."""
-        from jffsr.planning.export import to_mat
-
-        to_mat(self, path)
+        to_mat(self.problem.robot, self.motion, self.cost, path)
 
     def joint_table(self, period: float) -> dict[str, np.ndarray]:
         """Joint motion every `period` s; see `jffsr.planning.export.joint_table`."""
-        from jffsr.planning.export import joint_table
-
-        return joint_table(self, period)
+        return joint_table(self.trajectory, float(self.motion.time[-1]), period)
 
 
 class SearchInterrupted(Exception):

@@ -4,10 +4,9 @@ Resolved in the base frame, the locked inertia I_B(q) about the system centre of
 momentum h_B(q, qd) that the joints carry with the base held do not depend on the attitude:
 w_B = I_B^-1 (R' L - h_B). So they are evaluated for every grid point in one go, outside the integration.
 
-Layout: a vector is a tuple of its three components and a matrix a tuple of rows; each component is an array
-over (bodies, time), so that every operation is a long contiguous loop that the compiler can vectorise. Small
-matrices batched the other way round go through one library call each on the CPU. Only the product of
-rotations along the tree is a loop over joints; all else treats the bodies as one more batch axis. The
+Layout: every component of a vector or matrix is an array over (bodies, time); `spatial.components` says why.
+Only the sums and products along the tree are loops over joints; all else treats the bodies as one more batch
+axis. The
 barriers keep the compiler from computing a producer again for each of its consumers. The readable
 kinematics in `dynamics` is the test of this module.
 """
@@ -22,13 +21,23 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.robots.robot import Robot, Topology
+from jffsr.spatial.components import (
+    Components,
+    Rows,
+    Symmetric,
+    add,
+    cross,
+    dot,
+    point_inertia,
+    rows_product,
+    rows_times,
+    scale,
+    subtract,
+    symmetric_inverse,
+    symmetric_times,
+)
 from jffsr.spatial.inertia import skew
 from jffsr.types import Array
-
-Components = tuple[Array, Array, Array]
-Rows = tuple[Components, Components, Components]
-Symmetric = tuple[Array, Array, Array, Array, Array, Array]
-"""Elements xx, yy, zz, xy, xz, yz of a symmetric matrix."""
 
 
 @jax.tree_util.register_dataclass
@@ -49,69 +58,6 @@ class JointTerms:
     def base_rate(self, angular_momentum_B: Components) -> Components:
         """Angular velocity of the base in B, rad/s, under an angular momentum resolved in B."""
         return subtract(symmetric_times(self.inverse_inertia, angular_momentum_B), self.joint_rate)
-
-
-def add(a: Components, b: Components) -> Components:
-    """a + b."""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def subtract(a: Components, b: Components) -> Components:
-    """a - b."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def scale(factor: Array, a: Components) -> Components:
-    """factor a."""
-    return (factor * a[0], factor * a[1], factor * a[2])
-
-
-def dot(a: Components, b: Components) -> Array:
-    """a . b."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Components, b: Components) -> Components:
-    """a x b."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def rows_times(m: Rows, v: Components) -> Components:
-    """M v."""
-    return (dot(m[0], v), dot(m[1], v), dot(m[2], v))
-
-
-def rows_product(a: Rows, b: Rows) -> Rows:
-    """A B."""
-    columns = tuple(zip(*b, strict=True))
-    return tuple(tuple(dot(row, column) for column in columns) for row in a)
-
-
-def symmetric_times(s: Symmetric, v: Components) -> Components:
-    """S v."""
-    xx, yy, zz, xy, xz, yz = s
-    return rows_times(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), v)
-
-
-def symmetric_inverse(s: Symmetric) -> Symmetric:
-    """S^-1 by cofactors."""
-    xx, yy, zz, xy, xz, yz = s
-    cofactors = (
-        yy * zz - yz * yz,
-        xx * zz - xz * xz,
-        xx * yy - xy * xy,
-        xz * yz - xy * zz,
-        xy * yz - xz * yy,
-        xy * xz - xx * yz,
-    )
-    inverse = 1 / (xx * cofactors[0] + xy * cofactors[3] + xz * cofactors[4])
-    return tuple(inverse * c for c in cofactors)
-
-
-def point_inertia(r: Components) -> Symmetric:
-    """|r|^2 1 - r r'."""
-    x, y, z = r
-    return (y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z)
 
 
 def joint_terms(robot: Robot, joint_position: Array, joint_velocity: Array) -> JointTerms:

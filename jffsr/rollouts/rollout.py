@@ -10,19 +10,17 @@ import jax.numpy as jnp
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
-from jffsr.rollouts.joint_terms import (
-    Components,
-    JointTerms,
-    Rows,
+from jffsr.rollouts.joint_terms import JointTerms, joint_terms
+from jffsr.rollouts.motion import JointGrid, Motion, sample_joints
+from jffsr.spatial.components import (
     add,
     cross,
-    dot,
-    joint_terms,
+    quaternion_rows,
     rows_times,
+    rows_transposed_times,
     subtract,
     symmetric_times,
 )
-from jffsr.rollouts.motion import JointGrid, Motion, sample_joints
 from jffsr.trajectories.interface import Trajectory
 from jffsr.types import Array, Scalar, Twist
 
@@ -72,13 +70,13 @@ def rollout_grid(
     components = _integrate_attitude(terms, grid.time[2] - grid.time[0], initial, momentum[3:])
 
     time = grid.time[::2]
-    rotation = _rotation_rows(components)
+    rotation = quaternion_rows(components)
     samples = jax.tree.map(lambda x: x[::2], terms)
     drift = tuple(momentum[:3] / jnp.sum(jnp.asarray(robot.mass)))
     offset = rows_times(rotation, samples.com)
     start = jnp.asarray(initial_state.base_position)
     position = tuple(start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3))
-    omega_B = samples.base_rate(_unturn(rotation, tuple(momentum[3:])))
+    omega_B = samples.base_rate(rows_transposed_times(rotation, tuple(momentum[3:])))
     swing = rows_times(rotation, add(cross(omega_B, samples.com), samples.com_velocity))
     velocity = subtract(drift, swing)
     return Motion(
@@ -94,19 +92,6 @@ def rollout_grid(
     )
 
 
-def _rotation_rows(q: tuple[Array, Array, Array, Array]) -> Rows:
-    w, x, y, z = q
-    return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-
-
-def _unturn(rotation: Rows, v: Components) -> Components:
-    return tuple(dot(column, v) for column in zip(*rotation, strict=True))
-
-
 def _integrate_attitude(
     terms: JointTerms, step: Scalar, initial: Array, angular_momentum: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -118,7 +103,7 @@ def _integrate_attitude(
 
     def rate(stage: Array, q):
         w, x, y, z = q
-        spin = symmetric_times(tuple(stage[:6]), _unturn(_rotation_rows(q), momentum))
+        spin = symmetric_times(tuple(stage[:6]), rows_transposed_times(quaternion_rows(q), momentum))
         ox, oy, oz = subtract(spin, tuple(stage[6:]))
         return (
             0.5 * (-x * ox - y * oy - z * oz),
