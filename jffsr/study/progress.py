@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 from collections.abc import Callable
 
@@ -31,7 +32,8 @@ def progress_bar(phases: list[Phase], shown: bool) -> tuple[Callable[[Snapshot],
         unit="eval",
         disable=None if shown else True,
         file=sys.stderr,
-        dynamic_ncols=True,
+        # A terminal that does not know its width says 0, and would get an empty bar.
+        ncols=shutil.get_terminal_size().columns,
         smoothing=0.1,
     )
 
