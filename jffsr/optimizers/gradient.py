@@ -11,6 +11,7 @@ worse, and one without a finite value and gradient is drawn again, uniform in th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -42,9 +43,15 @@ _SHORTEST_STEP = 1e-10
 @dataclass(frozen=True)
 class Descent:
     """One start: point, smooth value and gradient accepted last, the search direction, and the step length
-    on trial between those known to be too short and too long."""
+    on trial between those known to be too short and too long.
+
+    trial and the same point `inside` the box are evaluated next. They are kept here, and not computed where
+    they are needed, so that the point reported is the point evaluated to the last bit.
+    """
 
     point: Array
+    trial: Array
+    inside: Array
     smooth: Array
     gradient: Array
     direction: Array
@@ -111,6 +118,8 @@ class GradientDescent:
         count = points.shape[0]
         descent = Descent(
             point=points,
+            trial=points,
+            inside=_all_to_box(problem, points),
             smooth=jnp.full(count, jnp.inf),
             gradient=jnp.zeros_like(points),
             direction=jnp.zeros_like(points),
@@ -125,14 +134,17 @@ class GradientDescent:
         )
         return GradientState(key, descent, replace(no_progress(positions[0]), best_value=values[0]))
 
-    def _evaluate(self, problem: OptimizationProblem, points: Array) -> tuple[Array, Array, Array]:
-        """Smooth values, true values and gradients of a batch of unconstrained points."""
-        lower, upper = problem.bounds()
+    def _evaluate(
+        self, problem: OptimizationProblem, trial: Array, inside: Array
+    ) -> tuple[Array, Array, Array]:
+        """Smooth values, true values and gradients, in unconstrained coordinates, of a batch of points."""
 
-        def objective(z: Vector) -> tuple[Scalar, Scalar]:
-            return problem.smooth_and_value(to_box(z, lower, upper), self.looseness)
+        def objective(x: Vector) -> tuple[Scalar, Scalar]:
+            return problem.smooth_and_value(x, self.looseness)
 
-        (smooth, value), gradient = jax.vmap(jax.value_and_grad(objective, has_aux=True))(points)
+        (smooth, value), in_box = jax.vmap(jax.value_and_grad(objective, has_aux=True))(inside)
+        _, pull_back = jax.vjp(partial(_all_to_box, problem), trial)
+        (gradient,) = pull_back(in_box)
         usable = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)
         return (
             jnp.where(usable, smooth, jnp.inf),
@@ -143,18 +155,20 @@ class GradientDescent:
     def step(self, problem: OptimizationProblem, state: GradientState) -> GradientState:
         """One trial of every active start."""
         descent, progress = state.descent, state.progress
-        trial = descent.point + descent.length[:, None] * descent.direction
-        smooth, value, gradient = self._evaluate(problem, trial)
+        trial, inside = descent.trial, descent.inside
+        smooth, value, gradient = self._evaluate(problem, trial, inside)
         lower, upper = problem.bounds()
-        inside = jax.vmap(lambda z: to_box(z, lower, upper))(trial)
         advanced = jax.vmap(self._advance)(descent, trial, smooth, gradient)
         improved = descent.active & (value < descent.best_value)
         lost = ~jnp.isfinite(descent.smooth) & ~jnp.isfinite(smooth)
         fresh = sample_box(jax.random.fold_in(state.key, progress.iteration), problem, trial.shape[0])
         again = replace(descent, point=jax.vmap(lambda x: from_box(x, lower, upper))(fresh))
         advanced = _select(descent.active, _select(lost, again, advanced), descent)
+        following = advanced.point + advanced.length[:, None] * advanced.direction
         advanced = replace(
             advanced,
+            trial=following,
+            inside=_all_to_box(problem, following),
             best_position=jnp.where(improved[:, None], inside, descent.best_position),
             best_value=jnp.where(improved, value, descent.best_value),
         )
@@ -208,6 +222,8 @@ class GradientDescent:
             length=chosen(first, another),
             too_short=chosen(jnp.zeros_like(too_short), too_short),
             too_long=chosen(jnp.full_like(too_long, jnp.inf), too_long),
+            trial=old.trial,
+            inside=old.inside,
             memory=chosen(memory, old.memory),
             stalled=chosen(stalled, old.stalled),
             active=jnp.where(accepted, ~flat & (stalled < 10), ~spent),
@@ -228,6 +244,11 @@ class GradientDescent:
     def population(self, state: GradientState) -> Population:
         """The best point of each start."""
         return Population(state.descent.best_position, state.descent.best_value)
+
+
+def _all_to_box(problem: OptimizationProblem, points: Array) -> Array:
+    lower, upper = problem.bounds()
+    return jax.vmap(lambda z: to_box(z, lower, upper))(points)
 
 
 def _select(which: Array, yes: Descent, no: Descent) -> Descent:
