@@ -17,7 +17,7 @@ from jffsr.robots.loading import describe_robot
 from jffsr.robots.state import State
 from jffsr.rollouts.rollout import rollout
 
-STEPS = 1000
+STEPS = 2000
 
 
 @jax.tree_util.register_dataclass
@@ -85,9 +85,9 @@ def test_one_link_follows_the_closed_form(one_link):
         q / (2 * np.pi)
     )
     expected = -q / 2 - (a - c) / root * branch
-    np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(angle[-1], -np.pi * (1 + (a - c) / root), rtol=0, atol=1e-11)
-    np.testing.assert_allclose(angle[-1], -0.835470417149851, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(angle, expected, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(angle[-1], -np.pi * (1 + (a - c) / root), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(angle[-1], -0.835470417149851, rtol=0, atol=1e-12)
 
 
 def test_a_square_loop_turns_the_base(arm):
