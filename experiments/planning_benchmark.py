@@ -207,8 +207,9 @@ def _draw(rows: list[dict], path: Path) -> None:
         if not curves:
             continue
         values = np.array([[np.nan if v is None else max(v, floor) for v in curve] for curve in curves])
-        end = median(row["charged"] for row in rows if row["method"] == method)
-        # Quartiles only where every seed has a value, and no further than the budget.
+        # Quartiles only where every seed has a value, and to the first point of the grid where all have ended.
+        longest = max(row["charged"] for row in rows if row["method"] == method)
+        end = CURVE_GRID[min(np.searchsorted(CURVE_GRID, longest), CURVE_GRID.size - 1)]
         shown = ~np.isnan(values).any(axis=0) & (CURVE_GRID <= end)
         low, middle, high = np.percentile(values[:, shown], (25, 50, 75), axis=0)
         axes.fill_between(CURVE_GRID[shown], low, high, color=colour, alpha=0.18, linewidth=0)

@@ -59,7 +59,7 @@ class Overrun(Section):
 
 
 class GoalAttitude(Section):
-    """Final attitude error, rad; enabled null: on when a goal attitude is given."""
+    """Final attitude error, the sine of half its angle; enabled null: on when a goal attitude is given."""
 
     scale: Positive = 0.001
     enabled: FlagOrNull = None
