@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.robots.description import FIXED, JointDescription, LinkDescription, RobotDescription
+from jffsr.robots.geometry import KINDS, MESH, NUM_SIZES, Geometry, Shape
 from jffsr.robots.robot import PRISMATIC, REVOLUTE, Limits, Robot, Topology
 
 # Published tables are rounded: a triangle inequality may be missed by this share of the largest moment.
@@ -29,6 +31,8 @@ def build_robot(description: RobotDescription) -> Robot:
 def check_link(where: str, link: LinkDescription) -> None:
     """Refuse a link whose mass or inertia no rigid body can have."""
     body = f"{where}: link '{link.name}'"
+    if link.mass is None:
+        return
     if not np.isfinite(link.mass):
         raise InputError(f"{body}: mass is {link.mass}; a finite number of kg is expected")
     if link.mass <= 0:
@@ -106,6 +110,33 @@ def _check_names(description: RobotDescription) -> None:
             raise InputError(f"{where}: end effector '{tool.name}': its pose is not finite")
         if not _is_rotation(tool.rotation):
             raise InputError(f"{where}: end effector '{tool.name}': rotation is not a rotation matrix")
+    for shape in description.shapes:
+        if shape.body not in links:
+            raise InputError(f"{where}: shape '{shape.name}': link '{shape.body}' does not exist")
+        _check_shape(f"{where}: link '{shape.body}': shape '{shape.name}'", shape)
+
+
+def _check_shape(place: str, shape: Shape) -> None:
+    if shape.kind not in KINDS:
+        raise InputError(f"{place}: kind '{shape.kind}' is not known; allowed are {', '.join(KINDS)}")
+    for what, value in (("position", shape.position), ("rotation", shape.rotation)):
+        if not np.all(np.isfinite(value)):
+            raise InputError(f"{place}: {what} {np.asarray(value).tolist()} is not finite")
+    if not _is_rotation(shape.rotation):
+        raise InputError(f"{place}: rotation is not a rotation matrix")
+    count = NUM_SIZES[shape.kind]
+    if shape.size.shape != (count,) or not np.all(np.isfinite(shape.size)) or np.any(shape.size <= 0):
+        raise InputError(
+            f"{place}: size {shape.size.tolist()}; a {shape.kind} needs {count} positive numbers"
+        )
+    if shape.kind != MESH:
+        return
+    if shape.vertices is None or shape.faces is None or not len(shape.vertices) or not len(shape.faces):
+        raise InputError(f"{place}: the mesh has no vertices or no faces")
+    if not np.all(np.isfinite(shape.vertices)):
+        raise InputError(f"{place}: the mesh has vertices that are not finite")
+    if shape.faces.min() < 0 or shape.faces.max() >= len(shape.vertices):
+        raise InputError(f"{place}: the mesh has faces that name vertices it does not have")
 
 
 def _tree_order(description: RobotDescription) -> list[JointDescription]:
@@ -153,6 +184,8 @@ class _Body:
         self.parts: list[tuple[float, np.ndarray, np.ndarray]] = []
 
     def add(self, link: LinkDescription, position: np.ndarray, rotation: np.ndarray) -> None:
+        if link.mass is None:
+            return
         com = position + rotation @ link.com
         self.parts.append((link.mass, com, rotation @ link.inertia @ rotation.T))
 
@@ -194,6 +227,12 @@ def _assemble(description: RobotDescription, order: list[JointDescription]) -> R
     if not moving:
         raise InputError(f"{description.origin}: the robot has no revolute or prismatic joint")
 
+    for body in bodies:
+        if not body.parts:
+            raise InputError(
+                f"{description.origin}: link '{body.name}' moves and has no inertia, nor has any link fixed to "
+                f"it; a mass and an inertia are needed"
+            )
     lumped = [body.lumped() for body in bodies]
     base_com = lumped[0][1]
     tools = []
@@ -203,6 +242,14 @@ def _assemble(description: RobotDescription, order: list[JointDescription]) -> R
 
     def from_base_com(body: int, position: np.ndarray) -> np.ndarray:
         return position - base_com if body == 0 else position
+
+    shapes = []
+    for shape in description.shapes:
+        body, position, rotation = seat[shape.body]
+        position = from_base_com(body, position + rotation @ shape.position)
+        shapes.append(
+            replace(shape, body=bodies[body].name, position=position, rotation=rotation @ shape.rotation)
+        )
 
     n = len(moving)
     return Robot(
@@ -231,4 +278,5 @@ def _assemble(description: RobotDescription, order: list[JointDescription]) -> R
             end_effector_names=tuple(tool.name for tool in description.end_effectors),
             end_effector_bodies=tuple(body for body, _, _ in tools),
         ),
+        geometry=Geometry(tuple(shapes)),
     )

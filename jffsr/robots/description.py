@@ -6,17 +6,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from jffsr.robots.geometry import Shape
+
 FIXED = "fixed"
 
 
 @dataclass(frozen=True)
 class LinkDescription:
-    """A rigid link: mass in kg, centre of mass (3,) in the link frame, inertia (3, 3) about it."""
+    """A rigid link: mass in kg, centre of mass (3,) in the link frame, inertia (3, 3) about it.
+
+    A link whose mass is None is a bare frame: it adds nothing to the body that it belongs to.
+    """
 
     name: str
-    mass: float
+    mass: float | None
     com: np.ndarray
     inertia: np.ndarray
+
+    @classmethod
+    def frame(cls, name: str) -> LinkDescription:
+        """A bare frame."""
+        return cls(name, None, np.zeros(3), np.zeros((3, 3)))
 
 
 @dataclass(frozen=True)
@@ -55,6 +65,7 @@ class RobotDescription:
     links: tuple[LinkDescription, ...]
     joints: tuple[JointDescription, ...]
     end_effectors: tuple[EndEffectorDescription, ...]
+    shapes: tuple[Shape, ...] = ()  # placed in the frames of their links
     aliases: tuple[str, ...] = ()
     description: str = ""
     source: str = ""

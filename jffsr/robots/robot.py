@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.robots.geometry import Geometry
 from jffsr.types import Array
 
 REVOLUTE = "revolute"
@@ -98,7 +99,8 @@ class Robot:
     joint_axis (n, 3) is a unit vector in the joint frame. end_effector_position (m, 3) and
     end_effector_rotation (m, 3, 3) place the end effectors in the frames of their bodies. root_position
     (3,) is the origin of the file's root link in B. All are differentiable; after a gradient step,
-    joint_axis and the rotations must be normalised again. `topology` is static.
+    joint_axis and the rotations must be normalised again. `topology` and `geometry`, the shapes for drawing
+    and clearance in the frames of their bodies, are static.
     """
 
     mass: Array
@@ -112,6 +114,7 @@ class Robot:
     root_position: Array
     limits: Limits
     topology: Topology = field(metadata={"static": True})
+    geometry: Geometry = field(default_factory=Geometry, metadata={"static": True})
 
     @property
     def name(self) -> str:

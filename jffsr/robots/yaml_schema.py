@@ -16,6 +16,7 @@ from jffsr.robots.description import (
     LinkDescription,
     RobotDescription,
 )
+from jffsr.robots.geometry import COLLISION, KINDS, MESH, VISUAL, Shape
 
 
 def _any_float() -> PlainValidator:
@@ -39,6 +40,7 @@ Name = Annotated[str, text(r".{1,200}", "a name of at most 200 letters")]
 Prose = Annotated[str, text(r"(?s).{0,10000}", "a text")]
 
 _MOST = 1000
+_SOLIDS = tuple(kind for kind in KINDS if kind != MESH)
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -59,6 +61,19 @@ class InertiaModel(Section):
         )
 
 
+class ShapeModel(Section):
+    """A solid on a link, for drawing and clearance; `size` as in `jffsr.robots.geometry.Shape`, in m."""
+
+    type: Annotated[Literal["box", "sphere", "cylinder", "capsule", "ellipsoid"], choice(*_SOLIDS)]
+    size: Annotated[tuple[Number, ...], sequence("a list of 1 to 3 numbers", 1, 3)]
+    position: Triple = _ORIGIN
+    rpy_deg: Triple = _ORIGIN
+    role: Annotated[Literal["both", "visual", "collision"], choice("both", "visual", "collision")] = "both"
+    colour: (
+        Annotated[tuple[Number, ...], sequence("a list of 4 numbers (red, green, blue, alpha)", 4, 4)] | None
+    ) = None
+
+
 class LinkModel(Section):
     """A rigid link."""
 
@@ -66,6 +81,7 @@ class LinkModel(Section):
     mass: Number
     com: Triple = _ORIGIN
     inertia: InertiaModel
+    shapes: Annotated[tuple[ShapeModel, ...], sequence("a list of shapes", 0, _MOST)] = ()
 
 
 class LimitsModel(Section):
@@ -127,6 +143,11 @@ class RobotModel(Section):
                 EndEffectorDescription(t.name, t.link, np.array(t.position), rpy_deg_to_matrix(t.rpy_deg))
                 for t in self.end_effectors
             ),
+            shapes=tuple(
+                _shape(shape, link.name, number)
+                for link in (self.base, *self.links)
+                for number, shape in enumerate(link.shapes)
+            ),
             aliases=self.aliases,
             description=self.description,
             source=self.source,
@@ -156,6 +177,19 @@ def _exact_cosine(degrees: float) -> float:
 
 def _link(link: LinkModel) -> LinkDescription:
     return LinkDescription(link.name, link.mass, np.array(link.com, dtype=float), link.inertia.matrix())
+
+
+def _shape(shape: ShapeModel, link: str, number: int) -> Shape:
+    return Shape(
+        name=f"{link}_{shape.type}_{number}",
+        kind=shape.type,
+        body=link,
+        position=np.array(shape.position, dtype=float),
+        rotation=rpy_deg_to_matrix(shape.rpy_deg),
+        size=np.array(shape.size, dtype=float),
+        roles=(VISUAL, COLLISION) if shape.role == "both" else (shape.role,),
+        colour=shape.colour,
+    )
 
 
 def _joint(joint: JointModel) -> JointDescription:
