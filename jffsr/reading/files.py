@@ -11,28 +11,34 @@ from jffsr.errors import InputError
 MAX_BYTES = 1_000_000
 
 
-def read_text(path: Path, shown: str) -> str:
-    """The UTF-8 text of a regular file of at most MAX_BYTES, `shown` in messages; raises InputError."""
-    try:
-        # Opened first, and without waiting, so that a pipe or a device is refused and never read.
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise InputError(f"{shown}: this is not a regular file, a YAML file is expected")
-            data = file.read(MAX_BYTES + 1)
-    except InputError:
-        raise
-    except IsADirectoryError:
-        raise InputError(f"{shown}: this is a folder, a YAML file is expected") from None
-    except FileNotFoundError:
-        raise InputError(f"{shown}: there is no such file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{shown!r}: the file cannot be read ({reason.lower()})") from None
-    if len(data) > MAX_BYTES:
-        raise InputError(f"{shown}: the file is larger than {MAX_BYTES:,} bytes, the most that is read")
+def read_text(path: Path, shown: str, kind: str = "YAML", most: int = MAX_BYTES) -> str:
+    """The UTF-8 text of a regular file of at most `most` bytes, `shown` in messages; raises InputError."""
+    data = read_bytes(path, shown, f"a {kind} file", most)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         byte = f"0x{data[error.start]:02x}"
         raise InputError(f"{shown}:{line}: the file is not UTF-8 text (byte {byte})") from None
+
+
+def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes; `expected` names it in messages: "a YAML file"."""
+    try:
+        # Opened first, and without waiting, so that a pipe or a device is refused and never read.
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise InputError(f"{shown}: this is not a regular file, {expected} is expected")
+            data = file.read(most + 1)
+    except InputError:
+        raise
+    except IsADirectoryError:
+        raise InputError(f"{shown}: this is a folder, {expected} is expected") from None
+    except FileNotFoundError:
+        raise InputError(f"{shown}: there is no such file") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"{shown!r}: the file cannot be read ({reason.lower()})") from None
+    if len(data) > most:
+        raise InputError(f"{shown}: the file is larger than {most:,} bytes, the most that is read")
+    return data

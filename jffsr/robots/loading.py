@@ -13,11 +13,20 @@ from jffsr.reading.complaints import complaint
 from jffsr.reading.did_you_mean import hint
 from jffsr.reading.files import read_text
 from jffsr.reading.sources import Sources
+from jffsr.reading.xml_tree import parse_xml
 from jffsr.reading.yaml_lines import parse
 from jffsr.robots.builder import build_robot
 from jffsr.robots.description import RobotDescription
+from jffsr.robots.mjcf import describe_mjcf
 from jffsr.robots.robot import Robot
+from jffsr.robots.urdf import describe_urdf
 from jffsr.robots.yaml_schema import RobotModel
+
+YAML_SUFFIXES = (".yaml", ".yml")
+XML_SUFFIXES = (".urdf", ".xml", ".mjcf")
+MOST_XML = 10_000_000
+"""Bytes of an XML file: some publish arms with their vertices in the text."""
+_ALLOWED = ".yaml, .yml, .urdf, .xml or .mjcf"
 
 
 def list_robots() -> tuple[str, ...]:
@@ -26,10 +35,11 @@ def list_robots() -> tuple[str, ...]:
 
 
 def load_robot(name: str | Path) -> Robot:
-    """The robot of a catalogue name, an alias, or a path to a .yaml file.
+    """The robot of a catalogue name, an alias, or a path to a .yaml, .urdf, .xml or .mjcf file.
 
-    Raises InputError, naming file, body and reason, when the file does not exist, cannot be read, or
-    describes what no rigid body or tree can be.
+    The element at the top of an XML file says whether it is URDF (<robot>) or MJCF (<mujoco>). Raises
+    InputError, naming file, body and reason, when the file does not exist, cannot be read, describes what
+    no rigid body or tree can be, or has what a tree of rigid bodies on a free base has not.
     """
     return build_robot(describe_robot(name))
 
@@ -37,19 +47,42 @@ def load_robot(name: str | Path) -> Robot:
 def describe_robot(name: str | Path) -> RobotDescription:
     """The description behind `load_robot`: sources, notes and data as the file states them."""
     text = str(name)
-    if not text.lower().endswith((".yaml", ".yml")):
-        catalogue = _catalogue()
-        aliases = {alias: key for key, model in catalogue.items() for alias in model.aliases}
-        key = text if text in catalogue else aliases.get(text)
-        if key is not None:
-            return catalogue[key].describe(f"catalogue robot '{key}'")
-        known = sorted([*catalogue, *aliases])
-        raise InputError(
-            f"robot '{text}' is not in the catalogue{hint(text, known)} "
-            f"(known: {', '.join(known)}; or give a path to a .yaml file)"
-        )
-    path = Path(name)
-    return _parse(read_text(path, text), text).describe(text)
+    suffix = Path(text).suffix.lower()
+    if suffix in YAML_SUFFIXES:
+        return _parse(read_text(Path(name), text), text).describe(text)
+    if suffix in XML_SUFFIXES:
+        return _describe_xml(Path(name), text)
+    catalogue = _catalogue()
+    aliases = {alias: key for key, model in catalogue.items() for alias in model.aliases}
+    key = text if text in catalogue else aliases.get(text)
+    if key is not None:
+        return catalogue[key].describe(f"catalogue robot '{key}'")
+    if "/" in text or "\\" in text or _exists(text):
+        kind = f"files of type '{suffix}'" if suffix else "files without a type"
+        raise InputError(f"{text}: {kind} are not read as robots (allowed: {_ALLOWED})")
+    known = sorted([*catalogue, *aliases])
+    raise InputError(
+        f"robot '{text}' is not in the catalogue{hint(text, known)} "
+        f"(known: {', '.join(known)}; or give a path to a {_ALLOWED} file)"
+    )
+
+
+def _exists(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _describe_xml(path: Path, shown: str) -> RobotDescription:
+    root = parse_xml(read_text(path, shown, "URDF or MJCF", MOST_XML), shown)
+    if root.tag == "robot":
+        return describe_urdf(root, shown, path.parent)
+    if root.tag == "mujoco":
+        return describe_mjcf(root, shown, path.parent)
+    raise InputError(
+        f"{shown}:{root.line}: the first element is <{root.tag[:60]}>; <robot> (URDF) or <mujoco> (MJCF) is expected"
+    )
 
 
 @lru_cache(maxsize=1)
