@@ -139,7 +139,7 @@ def _joint(node: Node, notes: list[str]) -> JointDescription:
         )
     if node.all("mimic"):
         raise InputError(
-            f"{place}: <mimic> couples it to another joint, which is not supported; remove the element to move it freely"
+            f"{place}: <mimic> couples it to another joint, which is not supported; remove it to move the joint freely"
         )
     ends = {}
     for role in ("parent", "child"):
