@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -38,17 +39,21 @@ def describe_mjcf(root: Node, shown: str, folder: Path) -> RobotDescription:
 def _compile(prepared: Prepared, shown: str, folder: Path):
     import mujoco
 
-    try:
-        spec = mujoco.MjSpec.from_string(prepared.text)
-        # Fusing would lose bodies, the base's inertia among them, and their names.
-        spec.compiler.fusestatic = False
-        spec.compiler.discardvisual = False
-        spec.compiler.usethread = False
-        _check_ranges(spec, prepared, shown)
-        prepared.notes += give_meshes(spec, shown, folder)
-        return spec, spec.compile()
-    except (ValueError, TypeError, mujoco.FatalError) as error:
-        raise InputError(_sentence(str(error), prepared, shown)) from None
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            spec = mujoco.MjSpec.from_string(prepared.text)
+            # Fusing would lose bodies, the base's inertia among them, and their names.
+            spec.compiler.fusestatic = False
+            spec.compiler.discardvisual = False
+            spec.compiler.usethread = False
+            _check_ranges(spec, prepared, shown)
+            prepared.notes += give_meshes(spec, shown, folder)
+            model = spec.compile()
+        except (ValueError, TypeError, mujoco.FatalError) as error:
+            raise InputError(_sentence(str(error), prepared, shown)) from None
+    prepared.notes += [f"MuJoCo says: {' '.join(str(warning.message).split())}" for warning in said]
+    return spec, model
 
 
 def _sentence(message: str, prepared: Prepared, shown: str) -> str:
