@@ -47,7 +47,7 @@ def _compile(prepared: Prepared, shown: str, folder: Path):
             spec.compiler.fusestatic = False
             spec.compiler.discardvisual = False
             spec.compiler.usethread = False
-            _check_ranges(spec, prepared, shown)
+            _check_joints(spec, shown)
             prepared.notes += give_meshes(spec, shown, folder)
             model = spec.compile()
         except (ValueError, TypeError, mujoco.FatalError) as error:
@@ -63,15 +63,21 @@ def _sentence(message: str, prepared: Prepared, shown: str) -> str:
     place = prepared.blame(int(line.group(1)), shown) if line else shown
     words = re.sub(r"^(XML )?Error: ", "", words[: line.start()] if line else words)
     words = re.sub(r",? ?(Element name '.*?', id \d+|Object name = .*)$", "", words).strip()
+    words = re.sub(r"^(.*?),? ?Element '(\w+)'$", r"<\2>: \1", words)
     if "mjMINVAL" in words:
         return f"{place}: it moves and has no inertia, nor has any body fixed to it; a mass and an inertia are needed"
     return f"{place}: MuJoCo does not accept it: {words}"
 
 
-def _check_ranges(spec: Any, prepared: Prepared, shown: str) -> None:
+def _check_joints(spec: Any, shown: str) -> None:
     import mujoco
 
     for joint in spec.joints:
+        if joint.type == mujoco.mjtJoint.mjJNT_BALL:
+            raise InputError(
+                f"{shown}: body '{joint.parent.name}': joint '{joint.name}' is a ball joint; allowed are hinge and "
+                "slide, and a free joint on the base"
+            )
         low, high = joint.range
         stated = joint.limited != mujoco.mjtLimited.mjLIMITED_FALSE and (low, high) != (0, 0)
         # MuJoCo reads a reversed range as none at all.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -54,6 +55,8 @@ _FINITE = (
     "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "axis", "ref", "mass", "diaginertia", "fullinertia",
     "size", "fromto", "density", "scale", "refpos", "refquat",
 )  # fmt: skip
+_NAMES = ("name", "class", "childclass", "model", "file", "mesh", "material")
+_NAN = re.compile(r"[+-]?nan(\(.*\))?", re.IGNORECASE)
 
 
 @dataclass
@@ -168,6 +171,10 @@ def _refuse(root: Node) -> None:
             )
         if node.tag == "replicate":
             _check_copies(node)
+        for attribute, value in node.attributes.items():
+            # At a NaN, MuJoCo writes a log file into the working folder.
+            if attribute not in _NAMES and any(_NAN.fullmatch(word) for word in value.split()):
+                raise InputError(f"{place_of(node)}: <{node.tag}> {attribute} '{value}' is not finite")
         for attribute in _FINITE:
             for word in node.get(attribute).split():
                 if NUMBER.fullmatch(word) and not abs(float(word)) <= 1e30:

@@ -54,9 +54,7 @@ _HARMLESS_IN_JOINT = {"calibration", "safety_controller", "gazebo", "hardwareInt
 
 def describe_urdf(root: Node, shown: str, folder: Path) -> RobotDescription:
     """The description of a <robot> element; `shown` is the file's name, meshes are looked for from `folder`."""
-    if any(
-        node.tag.startswith("xacro:") or "${" in "".join(node.attributes.values()) for node in root.walk()
-    ):
+    if any(node.tag.startswith("xacro:") for node in root.walk()):
         raise InputError(
             f"{shown}: this is a xacro file, a program that writes a URDF; run it first (xacro FILE > robot.urdf)"
         )

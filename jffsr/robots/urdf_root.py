@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.reading.did_you_mean import hint
 from jffsr.robots.description import FIXED, JointDescription, LinkDescription
 
 FLOATING = "floating"
@@ -26,7 +27,7 @@ def settle_root(links: Links, joints: Joints, shown: str) -> tuple[Links, Joints
     skipped: set[str] = set()
     by_name = {link.name: link for link in links}
     while by_name[root].mass is None:
-        below = [joint for joint in joints if joint.parent == root and joint.child in by_name]
+        below = [joint for joint in joints if joint.parent == root]
         heavy = [
             joint
             for joint in below
@@ -69,7 +70,20 @@ def _root(links: Links, joints: Joints, shown: str) -> str:
     for name, count in counts.items():
         if count > 1:
             raise InputError(f"{shown}: two links are named '{name}'; names must differ")
-    children = {joint.child for joint in joints}
+    parents: dict[str, str] = {}
+    for joint in joints:
+        for role, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in counts:
+                raise InputError(
+                    f"{shown}: joint '{joint.name}': {role} link '{name}' does not exist{hint(name, counts)}"
+                )
+        if joint.child in parents:
+            raise InputError(
+                f"{shown}: link '{joint.child}' has two parents (joints '{parents[joint.child]}' and "
+                f"'{joint.name}'); closed loops are not supported"
+            )
+        parents[joint.child] = joint.name
+    children = set(parents)
     roots = [link.name for link in links if link.name not in children]
     if not roots:
         raise InputError(
@@ -88,7 +102,7 @@ def _mass_below(joint: JointDescription, joints: Joints, by_name: dict[str, Link
     waiting, seen = [joint.child], set()
     while waiting:
         name = waiting.pop()
-        if name in seen or name not in by_name:
+        if name in seen:
             continue
         seen.add(name)
         if by_name[name].mass is not None:
