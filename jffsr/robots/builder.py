@@ -14,6 +14,8 @@ from jffsr.robots.robot import PRISMATIC, REVOLUTE, Limits, Robot, Topology
 
 # Published tables are rounded: a triangle inequality may be missed by this share of the largest moment.
 _TRIANGLE_SLACK = 1e-9
+# Beside a length beyond this, in m, the others of a robot would be lost to rounding.
+_LONGEST = 1e6
 
 
 def build_robot(description: RobotDescription) -> Robot:
@@ -39,6 +41,8 @@ def check_link(where: str, link: LinkDescription) -> None:
         raise InputError(f"{body}: mass is {link.mass:g} kg; it must be positive")
     if not np.all(np.isfinite(link.com)):
         raise InputError(f"{body}: centre of mass {link.com.tolist()} is not finite")
+    if np.abs(link.com).max() > _LONGEST:
+        raise InputError(f"{body}: centre of mass {link.com.tolist()} m is farther than {_LONGEST:g} m")
     if not np.all(np.isfinite(link.inertia)):
         raise InputError(f"{body}: inertia {link.inertia.tolist()} is not finite")
     if not np.allclose(link.inertia, link.inertia.T, rtol=0, atol=1e-9 * np.abs(link.inertia).max()):
@@ -68,6 +72,8 @@ def _check_joint(where: str, joint: JointDescription) -> None:
     for what, value in (("position", joint.position), ("rotation", joint.rotation), ("axis", joint.axis)):
         if not np.all(np.isfinite(value)):
             raise InputError(f"{body}: {what} {np.asarray(value).tolist()} is not finite")
+    if np.abs(joint.position).max() > _LONGEST:
+        raise InputError(f"{body}: position {joint.position.tolist()} m is farther than {_LONGEST:g} m")
     if not _is_rotation(joint.rotation):
         raise InputError(f"{body}: rotation is not a rotation matrix")
     if joint.type != FIXED and np.linalg.norm(joint.axis) < 1e-12:

@@ -67,6 +67,6 @@ def quaternion_to_matrix(quaternion: np.ndarray) -> np.ndarray:
 def _cosine_and_sine(angle: float) -> tuple[float, float]:
     # pi/2 has no exact number: its cosine, 6e-17, would tilt axes that a file states as parallel.
     quarters = round(angle / _QUARTER)
-    if abs(angle - quarters * _QUARTER) <= 4e-16 * max(1.0, abs(angle)):
+    if abs(quarters) < 100 and abs(angle - quarters * _QUARTER) <= 4e-16 * max(1.0, abs(angle)):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[quarters % 4]
     return math.cos(angle), math.sin(angle)

@@ -114,7 +114,9 @@ def of_yaml(text: str, base: str) -> Snapshot:
         links[str(link["name"])] = (float(link["mass"]), com, _tensor(link["inertia"], ""))
     joints = []
     for joint in record["joints"]:
-        turn = Rotation.from_euler("xyz", np.deg2rad(joint.get("rpy_deg", (0, 0, 0)))).as_matrix()
+        turn = Rotation.from_euler(
+            "xyz", np.deg2rad(np.array(joint.get("rpy_deg", (0, 0, 0)), float))
+        ).as_matrix()
         axis = np.array(joint.get("axis", (0, 0, 1)), float)
         position = np.array(joint.get("position", (0, 0, 0)), float)
         # A name that looks like a date is a name all the same.
