@@ -28,7 +28,7 @@ def problem(robots):
     start, goal = np.array([0.2, 0.4]), np.array([0.9, -0.6])
     trajectory = SinePolynomial.between(start, goal, limits.position_lower, limits.position_upper, 12.0)
     index = composite_index(robot, joint_goal=goal, excursion_limit=0.1, tool_position=1e-3)
-    return Problem(robot, trajectory, index, momentum=MOMENTUM, num_steps=20, base_mode=ATTITUDE_HELD)
+    return Problem(robot, trajectory, index, momentum=MOMENTUM, num_steps=60, base_mode=ATTITUDE_HELD)
 
 
 def test_a_plan_with_the_attitude_held_is_met_and_verified(problem):
