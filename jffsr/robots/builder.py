@@ -34,14 +34,26 @@ def build_robot(description: RobotDescription) -> Robot:
         check_joint(where, joint)
     check_names(description)
     order = _tree_order(description)
-    robot, seats = _assemble(description, order)
-    for number, arm in enumerate(description.arms):
-        robot = _with_arm(robot, arm, seats, f"{where}: arms.{number}")
-    for number, payload in enumerate(description.payloads):
-        robot = _with_payload(robot, payload, f"{where}: payloads.{number}")
+    with np.errstate(over="ignore", invalid="ignore"):
+        robot, seats = _assemble(description, order)
+        for number, arm in enumerate(description.arms):
+            robot = _with_arm(robot, arm, seats, f"{where}: arms.{number}")
+        for number, payload in enumerate(description.payloads):
+            robot = _with_payload(robot, payload, f"{where}: payloads.{number}")
     if not robot.num_joints:
         raise InputError(f"{where}: the robot has no revolute or prismatic joint")
+    _check_range(robot, where)
     return robot
+
+
+def _check_range(robot: Robot, where: str) -> None:
+    """Refuse a body whose parts are so far apart, or so heavy, that its inertia has no number."""
+    for body, inertia in zip(robot.body_names, robot.inertia, strict=True):
+        if not np.all(np.isfinite(inertia)):
+            raise InputError(
+                f"{where}: link '{body}': the inertia of what is fixed to it is too large a number; "
+                f"distances in m and masses in kg are expected"
+            )
 
 
 def _with_arm(robot: Robot, arm: ArmDescription, links: dict[str, Seat], place: str) -> Robot:
@@ -59,7 +71,7 @@ def _with_payload(robot: Robot, payload: PayloadDescription, place: str) -> Robo
     """The robot with a rigid body in one of its tools."""
 
     def at(key: str) -> str:
-        return payload.places.get(key, f"{place}.{key}")
+        return payload.places.get(key, f"{place}.{key}".rstrip("."))
 
     check_pose(at, payload.position, payload.rotation)
     link, tools = payload.body, robot.end_effector_names
@@ -68,7 +80,7 @@ def _with_payload(robot: Robot, payload: PayloadDescription, place: str) -> Robo
             f"{at('end_effector')}: found '{payload.end_effector}', which '{robot.name}' does not have"
             f"{hint(payload.end_effector, tools)} (it has {', '.join(tools) or 'none'})"
         )
-    check_link(at("mass"), link)
+    check_link(at(""), link)
     for shape in payload.shapes:
         check_shape(f"{at('shapes')}: shape '{shape.name}'", shape)
     seat = end_effector_seat(robot, tools.index(payload.end_effector))

@@ -33,15 +33,15 @@ def joined_topology(
     tools = kept_tools(arm, keep)
     joined = {}
     for what, names, others in (
-        ("joint", host.joint_names, arm.joint_names),
-        ("body", host.body_names, arm.body_names[1:]),
-        ("end effector", host.end_effector_names, tuple(arm.end_effector_names[i] for i in tools)),
+        ("a joint", host.joint_names, arm.joint_names),
+        ("a body", host.body_names, arm.body_names[1:]),
+        ("an end effector", host.end_effector_names, tuple(arm.end_effector_names[i] for i in tools)),
     ):
         others = tuple(prefix + other for other in others)
         shared = sorted(set(names) & set(others), key=others.index)
         if shared:
             raise InputError(
-                f"{where}: both have a {what} named '{shared[0]}'; give the arm a prefix that makes its names "
+                f"{where}: both have {what} named '{shared[0]}'; give the arm a prefix that makes its names "
                 f"differ, such as '{arm.name}_'"
             )
         joined[what] = (*names, *others)
@@ -49,9 +49,9 @@ def joined_topology(
         name=host.name if name is None else name,
         parents=(*host.parents, *moved(arm.parents)),
         joint_types=(*host.joint_types, *arm.joint_types),
-        joint_names=joined["joint"],
-        body_names=joined["body"],
-        end_effector_names=joined["end effector"],
+        joint_names=joined["a joint"],
+        body_names=joined["a body"],
+        end_effector_names=joined["an end effector"],
         end_effector_bodies=(
             *host.end_effector_bodies,
             *moved(tuple(arm.end_effector_bodies[i] for i in tools)),

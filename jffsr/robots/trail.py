@@ -47,7 +47,7 @@ class Trail:
             if self.count.robots > MAX_ROBOTS:
                 raise InputError(f"the robot is made of more than {MAX_ROBOTS} robots")
             if "/" in robot or robot.lower().endswith(_FILE_ENDINGS):
-                robot = os.path.join(folder, os.path.expanduser(robot))
+                robot = str(Path(folder) / os.path.expanduser(robot))
             return describe(robot, below)
 
         return find

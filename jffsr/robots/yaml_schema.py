@@ -218,10 +218,10 @@ class RobotModel(Section):
         )
 
     def _places(self, entry: str, model: type[Section], origin: str) -> dict[str, str]:
-        """File, line and key of each key of an entry, of the entry where the key is not written."""
+        """File, line and key of an entry, under "", and of each of its keys."""
         places = {}
-        for name in model.model_fields:
-            key = f"{entry}.{name}"
+        for name in ("", *model.model_fields):
+            key = f"{entry}.{name}" if name else entry
             mark = self._sources.mark(tuple(key.split(".")))
             places[name] = f"{mark.place if mark else origin}: {key}"
         return places
