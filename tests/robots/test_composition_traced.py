@@ -10,17 +10,26 @@ from composition_parts import INERTIA, POSITION, QUATERNION, furnished
 
 import jffsr
 from jffsr.robots.builder import build_robot
+from jffsr.robots.geometry import Shape
 
-NUMBERS = dict(position=POSITION, quaternion=QUATERNION, mass=np.array(7.0), com=np.array([0.3, 0.2, -0.1]))
+ARM = jffsr.load_robot("hu_2011_planar2")
+NUMBERS = dict(
+    position=POSITION,
+    quaternion=QUATERNION,
+    mass=np.array(7.0),
+    com=np.array([0.3, 0.2, -0.1]),
+    bus=np.array(50.0),
+    arm_mass=ARM.mass,
+    arm_root=np.array([0.1, -0.2, 0.3]),
+)
 
 
 @pytest.fixture(scope="module")
 def value():
-    bus = jffsr.RigidBody.create(50.0, INERTIA, com=[0.1, 0.0, -0.2], name="bus")
-    arm = jffsr.load_robot("hu_2011_planar2")
-
     def value(numbers):
         """A number that all inputs of a composition move."""
+        bus = jffsr.RigidBody.create(numbers["bus"], INERTIA, com=[0.1, 0.0, -0.2], name="bus")
+        arm = ARM.replace(mass=numbers["arm_mass"], root_position=numbers["arm_root"])
         robot = jffsr.attach(
             bus, arm, position=numbers["position"], quaternion=numbers["quaternion"], arm_base="keep"
         )
@@ -40,7 +49,7 @@ def test_jit_and_vmap_give_the_numbers_of_the_host(value):
     expected = float(value(NUMBERS))
     np.testing.assert_allclose(jax.jit(value)(NUMBERS), expected, rtol=1e-13)
     many = np.stack([POSITION, POSITION + 0.5, np.zeros(3)])
-    along = {"position": 0, "quaternion": None, "mass": None, "com": None}
+    along = dict.fromkeys(NUMBERS) | {"position": 0}
     found = jax.jit(jax.vmap(value, in_axes=(along,)))(NUMBERS | {"position": many})
     np.testing.assert_allclose(found, [float(value(NUMBERS | {"position": p})) for p in many], rtol=1e-13)
 
@@ -74,3 +83,21 @@ def test_shapes_at_traced_places_are_left_out():
     jax.jit(compose, static_argnums=1)(POSITION, "left")
     compose(jnp.asarray(POSITION), None)
     assert kept == [{"palm", "b_palm"}, {"hull", "palm", "b_palm"}, {"hull", "palm", "b_hull", "b_palm"}]
+
+
+def test_a_targets_shapes_do_not_hang_on_its_traced_numbers():
+    """They are placed by the target's own frame, so that estimates of mass and centre of mass leave them alone."""
+    sphere = Shape("sphere", "sphere", "any", np.array([0.5, 0.0, 0.0]), np.eye(3), np.array([0.2]))
+    robot, kept = ARM, []
+
+    @jax.jit
+    def compose(mass, com):
+        target = jffsr.RigidBody.create(mass, mass * jnp.ones(3), com=com, name="rock", shapes=[sphere])
+        compound = jffsr.weld(robot, target, position=[1.0, 0.0, 0.0])
+        kept.extend(compound.geometry.shapes)
+        return compound.mass
+
+    np.testing.assert_allclose(compose(3.0, POSITION), robot.mass + np.array([0.0, 0.0, 3.0]))
+    (shape,) = kept
+    assert shape.body == robot.body_names[2]
+    np.testing.assert_allclose(shape.position, robot.end_effector_position[0] + [1.5, 0.0, 0.0])
