@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -17,6 +18,7 @@ from jffsr.reading.yaml_lines import parse
 from jffsr.robots.builder import build_robot
 from jffsr.robots.description import RobotDescription
 from jffsr.robots.robot import Robot
+from jffsr.robots.trail import Trail
 from jffsr.robots.yaml_schema import RobotModel
 
 
@@ -34,29 +36,38 @@ def load_robot(name: str | Path) -> Robot:
     return build_robot(describe_robot(name))
 
 
-def describe_robot(name: str | Path) -> RobotDescription:
-    """The description behind `load_robot`: sources, notes and data as the file states them."""
+def describe_robot(name: str | Path, trail: Trail | None = None) -> RobotDescription:
+    """The description behind `load_robot`: sources, notes and data as the file states them.
+
+    `trail` says which robots this one is an arm of.
+    """
     text = str(name)
+    trail = trail or Trail()
     if not text.lower().endswith((".yaml", ".yml")):
         catalogue = _catalogue()
         aliases = {alias: key for key, model in catalogue.items() for alias in model.aliases}
         key = text if text in catalogue else aliases.get(text)
         if key is not None:
-            return catalogue[key].describe(f"catalogue robot '{key}'")
+            find = trail.arms_of(key, key, _data(), describe_robot)
+            return catalogue[key].describe(f"catalogue robot '{key}'", find)
         known = sorted([*catalogue, *aliases])
         raise InputError(
             f"robot '{text}' is not in the catalogue{hint(text, known)} "
             f"(known: {', '.join(known)}; or give a path to a .yaml file)"
         )
     path = Path(name)
-    return _parse(read_text(path, text), text).describe(text)
+    model = _parse(read_text(path, text), text)
+    return model.describe(text, trail.arms_of(text, os.path.realpath(path), path.parent, describe_robot))
+
+
+def _data() -> Path:
+    return Path(str(resources.files("jffsr.robots"))) / "data"
 
 
 @lru_cache(maxsize=1)
 def _catalogue() -> dict[str, RobotModel]:
-    folder = resources.files("jffsr.robots") / "data"
     models = {}
-    for entry in folder.iterdir():
+    for entry in _data().iterdir():
         if entry.name.endswith(".yaml"):
             model = _parse(entry.read_text(encoding="utf-8"), entry.name)
             models[model.name] = model
@@ -70,6 +81,8 @@ def _parse(text: str, origin: str) -> RobotModel:
             f"{origin}: a mapping with the keys {', '.join(RobotModel.model_fields)} is expected"
         )
     try:
-        return RobotModel.model_validate(document.value)
+        model = RobotModel.model_validate(document.value)
     except ValidationError as error:
         raise complaint(error, RobotModel, Sources((document.marks,))) from None
+    model._sources = Sources((document.marks,))
+    return model
