@@ -11,6 +11,7 @@ from jffsr.crosscheck.drive import EngineMotion, check_x64, make_drive
 from jffsr.crosscheck.mjx_run import run_mjx
 from jffsr.crosscheck.mujoco_run import run_mujoco
 from jffsr.crosscheck.report import ENGINE_TITLES, Comparison, CrosscheckReport, Tolerances
+from jffsr.dynamics.base_mode import FLOATING
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -50,6 +51,10 @@ def crosscheck(
     engines = _check_engines(engines)
     steps = _check_steps(steps)
     if reference is not None:
+        if reference.base_mode != FLOATING:
+            raise InputError(
+                f"the motion's base_mode is '{reference.base_mode}'; only floating bases are driven in MuJoCo and MJX"
+            )
         duration = float(reference.time[-1])
         momentum = reference.momentum if momentum is None else momentum
     duration = _check_positive("duration", float(check_duration(trajectory, duration)))

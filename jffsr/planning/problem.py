@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import jax
 import numpy as np
 
+from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -26,8 +27,9 @@ class Problem:
     """Choose the free numbers of `trajectory` so that the index of the motion is least.
 
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
-    L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps. All else is
-    traced: problems of one robot with other numbers share their compiled programs.
+    L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode,
+    static, is that of `jffsr.rollout`. All else is traced: problems of one robot with other numbers share
+    their compiled programs.
     """
 
     robot: Robot
@@ -36,6 +38,7 @@ class Problem:
     initial_state: State = field(default_factory=_at_rest_at_origin)
     momentum: Array = field(default_factory=lambda: np.zeros(6))
     num_steps: int = field(default=100, metadata={"static": True})
+    base_mode: str = field(default=FLOATING, metadata={"static": True})
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (k,) of the free numbers."""
@@ -45,7 +48,12 @@ class Problem:
         """The motion under the free numbers (k,)."""
         trajectory = self.trajectory.with_free(candidate)
         return rollout(
-            self.robot, trajectory, self.initial_state, num_steps=self.num_steps, momentum=self.momentum
+            self.robot,
+            trajectory,
+            self.initial_state,
+            num_steps=self.num_steps,
+            momentum=self.momentum,
+            base_mode=self.base_mode,
         )
 
     def value(self, candidate: Vector) -> Scalar:

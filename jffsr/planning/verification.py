@@ -67,6 +67,7 @@ def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[M
         problem.initial_state,
         num_steps=step_factor * problem.num_steps,
         momentum=problem.momentum,
+        base_mode=problem.base_mode,
     )
     common = finer.base_quaternion[::step_factor]
     error = quaternion_multiply(quaternion_conjugate(common), motion.base_quaternion)

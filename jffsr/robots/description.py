@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,8 +58,40 @@ class EndEffectorDescription:
 
 
 @dataclass(frozen=True)
+class ArmDescription:
+    """A robot whose root link's frame stands in that of a link or end effector, None the root link.
+
+    base says whether its own base comes with it ("keep") or not ("drop"), prefix what goes before its names;
+    places, by key, where a message should point.
+    """
+
+    robot: RobotDescription
+    position: np.ndarray
+    rotation: np.ndarray
+    link: str | None = None
+    base: str = "keep"
+    prefix: str = ""
+    places: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PayloadDescription:
+    """A rigid body whose frame stands in that of an end effector, and its shapes in its own frame."""
+
+    body: LinkDescription
+    end_effector: str
+    position: np.ndarray
+    rotation: np.ndarray
+    shapes: tuple[Shape, ...] = ()
+    places: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class RobotDescription:
-    """A whole robot and where it comes from; the first link is the root."""
+    """A whole robot and where it comes from; the first link is the root.
+
+    Arms are put on in their order, on what is there by then; payloads after them.
+    """
 
     name: str
     origin: str
@@ -66,6 +99,8 @@ class RobotDescription:
     joints: tuple[JointDescription, ...]
     end_effectors: tuple[EndEffectorDescription, ...]
     shapes: tuple[Shape, ...] = ()  # placed in the frames of their links
+    arms: tuple[ArmDescription, ...] = ()
+    payloads: tuple[PayloadDescription, ...] = ()
     aliases: tuple[str, ...] = ()
     description: str = ""
     source: str = ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -19,6 +20,7 @@ from jffsr.robots.builder import build_robot
 from jffsr.robots.description import RobotDescription
 from jffsr.robots.mjcf import describe_mjcf
 from jffsr.robots.robot import Robot
+from jffsr.robots.trail import Trail
 from jffsr.robots.urdf import describe_urdf
 from jffsr.robots.yaml_schema import RobotModel
 
@@ -44,19 +46,26 @@ def load_robot(name: str | Path) -> Robot:
     return build_robot(describe_robot(name))
 
 
-def describe_robot(name: str | Path) -> RobotDescription:
-    """The description behind `load_robot`: sources, notes and data as the file states them."""
+def describe_robot(name: str | Path, trail: Trail | None = None) -> RobotDescription:
+    """The description behind `load_robot`: sources, notes and data as the file states them.
+
+    `trail` says which robots this one is an arm of.
+    """
     text = str(name)
+    trail = trail or Trail()
     suffix = Path(text).suffix.lower()
     if suffix in YAML_SUFFIXES:
-        return _parse(read_text(Path(name), text), text).describe(text)
+        path = Path(name)
+        model = _parse(read_text(path, text), text)
+        return model.describe(text, trail.arms_of(text, os.path.realpath(path), path.parent, describe_robot))
     if suffix in XML_SUFFIXES:
         return _describe_xml(Path(name), text)
     catalogue = _catalogue()
     aliases = {alias: key for key, model in catalogue.items() for alias in model.aliases}
     key = text if text in catalogue else aliases.get(text)
     if key is not None:
-        return catalogue[key].describe(f"catalogue robot '{key}'")
+        find = trail.arms_of(key, key, _data(), describe_robot)
+        return catalogue[key].describe(f"catalogue robot '{key}'", find)
     if "/" in text or "\\" in text or _exists(text):
         kind = f"files of type '{suffix}'" if suffix else "files without a type"
         raise InputError(f"{text}: {kind} are not read as robots (allowed: {_ALLOWED})")
@@ -85,11 +94,14 @@ def _describe_xml(path: Path, shown: str) -> RobotDescription:
     )
 
 
+def _data() -> Path:
+    return Path(str(resources.files("jffsr.robots"))) / "data"
+
+
 @lru_cache(maxsize=1)
 def _catalogue() -> dict[str, RobotModel]:
-    folder = resources.files("jffsr.robots") / "data"
     models = {}
-    for entry in folder.iterdir():
+    for entry in _data().iterdir():
         if entry.name.endswith(".yaml"):
             model = _parse(entry.read_text(encoding="utf-8"), entry.name)
             models[model.name] = model
@@ -103,6 +115,8 @@ def _parse(text: str, origin: str) -> RobotModel:
             f"{origin}: a mapping with the keys {', '.join(RobotModel.model_fields)} is expected"
         )
     try:
-        return RobotModel.model_validate(document.value)
+        model = RobotModel.model_validate(document.value)
     except ValidationError as error:
         raise complaint(error, RobotModel, Sources((document.marks,))) from None
+    model._sources = Sources((document.marks,))
+    return model

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import PlainValidator, PrivateAttr
 
+from jffsr.errors import InputError
 from jffsr.reading.section import Section
+from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, expected, sequence, text
 from jffsr.robots.description import (
     FIXED,
+    ArmDescription,
     EndEffectorDescription,
     JointDescription,
     LinkDescription,
+    PayloadDescription,
     RobotDescription,
 )
 from jffsr.robots.geometry import COLLISION, KINDS, MESH, VISUAL, Shape
@@ -118,6 +123,25 @@ class EndEffectorModel(Section):
     rpy_deg: Triple = _ORIGIN
 
 
+class ArmModel(Section):
+    """Another robot, put on a link or end effector of this one (default: the base)."""
+
+    robot: Annotated[str, text(r".{1,1000}", "a robot's catalogue name, or the path of its file")]
+    link: Name | None = None
+    position: Triple = _ORIGIN
+    rpy_deg: Triple = _ORIGIN
+    base: Annotated[Literal["keep", "drop"], choice("keep", "drop")] = "keep"
+    prefix: Annotated[str, text(r".{0,200}", "a text of at most 200 letters")] = ""
+
+
+class PayloadModel(LinkModel):
+    """A rigid body held by an end effector, which its frame is placed in."""
+
+    end_effector: Name
+    position: Triple = _ORIGIN
+    rpy_deg: Triple = _ORIGIN
+
+
 class RobotModel(Section):
     """A robot file."""
 
@@ -129,11 +153,20 @@ class RobotModel(Section):
     notes: Prose = ""
     base: LinkModel
     links: Annotated[tuple[LinkModel, ...], sequence("a list of links", 0, _MOST)] = ()
-    joints: Annotated[tuple[JointModel, ...], sequence("a list of joints", 1, _MOST)]
+    joints: Annotated[tuple[JointModel, ...], sequence("a list of joints", 0, _MOST)] = ()
     end_effectors: Annotated[tuple[EndEffectorModel, ...], sequence("a list of end effectors", 0, _MOST)] = ()
+    arms: Annotated[tuple[ArmModel, ...], sequence("a list of arms", 0, _MOST)] = ()
+    payloads: Annotated[tuple[PayloadModel, ...], sequence("a list of payloads", 0, _MOST)] = ()
 
-    def describe(self, origin: str) -> RobotDescription:
-        """The description that the builder checks; `origin` is the file's name in messages."""
+    _sources: Sources = PrivateAttr(default_factory=Sources)
+
+    def describe(
+        self, origin: str, find_robot: Callable[[str], RobotDescription] | None = None
+    ) -> RobotDescription:
+        """The description that the builder checks; `origin` is the file's name in messages.
+
+        `find_robot` gives the description of an arm's robot by its name or path; only arms need it.
+        """
         return RobotDescription(
             name=self.name,
             origin=origin,
@@ -148,12 +181,50 @@ class RobotModel(Section):
                 for link in (self.base, *self.links)
                 for number, shape in enumerate(link.shapes)
             ),
+            arms=tuple(self._arm(number, origin, find_robot) for number in range(len(self.arms))),
+            payloads=tuple(self._payload(number, origin) for number in range(len(self.payloads))),
             aliases=self.aliases,
             description=self.description,
             source=self.source,
             license=self.license,
             notes=self.notes,
         )
+
+    def _arm(self, number: int, origin: str, find_robot: Callable[[str], RobotDescription]) -> ArmDescription:
+        arm, places = self.arms[number], self._places(f"arms.{number}", ArmModel, origin)
+        try:
+            robot = find_robot(arm.robot)
+        except InputError as error:
+            raise InputError(f"{places['robot']}: {error}") from None
+        return ArmDescription(
+            robot=robot,
+            position=np.array(arm.position),
+            rotation=rpy_deg_to_matrix(arm.rpy_deg),
+            link=arm.link,
+            base=arm.base,
+            prefix=arm.prefix,
+            places=places,
+        )
+
+    def _payload(self, number: int, origin: str) -> PayloadDescription:
+        payload = self.payloads[number]
+        return PayloadDescription(
+            body=_link(payload),
+            end_effector=payload.end_effector,
+            position=np.array(payload.position),
+            rotation=rpy_deg_to_matrix(payload.rpy_deg),
+            shapes=tuple(_shape(shape, payload.name, i) for i, shape in enumerate(payload.shapes)),
+            places=self._places(f"payloads.{number}", PayloadModel, origin),
+        )
+
+    def _places(self, entry: str, model: type[Section], origin: str) -> dict[str, str]:
+        """File, line and key of an entry, under "", and of each of its keys."""
+        places = {}
+        for name in ("", *model.model_fields):
+            key = f"{entry}.{name}" if name else entry
+            mark = self._sources.mark(tuple(key.split(".")))
+            places[name] = f"{mark.place if mark else origin}: {key}"
+        return places
 
 
 def rpy_deg_to_matrix(rpy_deg: tuple[float, ...]) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
+from jffsr.dynamics.base_mode import base_freedom
 from jffsr.dynamics.kinematics import kinematics, system_com
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
@@ -38,13 +39,16 @@ def momentum_drift(robot: Robot, motion: Motion) -> Scalar:
     The larger of the linear and the angular deviation, each divided by the largest sum over the bodies of
     the norms of their own momenta (angular: about the system centre of mass), which is not zero where the
     total is. A motion slower than differences of its poses can resolve is compared with that resolution,
-    so that a robot at rest gives 0. Raises InputError for fewer than 9 samples.
+    so that a robot at rest gives 0. What the motion's base_mode does not conserve is not judged: with the
+    attitude held the linear deviation alone, on a fixed base nothing, which gives 0. Raises InputError for
+    fewer than 9 samples.
     """
     linear, angular, resolution = _body_momenta(robot, motion)
-    stated = motion.momentum
-    return jnp.maximum(
-        _deviation(linear, stated[:3], resolution[0]), _deviation(angular, stated[3:], resolution[1])
-    )
+    stated, freedom = motion.momentum, base_freedom(motion.base_mode)
+    if freedom == 0:
+        return jnp.zeros(())
+    drift = _deviation(linear, stated[:3], resolution[0])
+    return drift if freedom == 3 else jnp.maximum(drift, _deviation(angular, stated[3:], resolution[1]))
 
 
 def _deviation(parts: Array, stated: Array, resolution: Scalar) -> Scalar:

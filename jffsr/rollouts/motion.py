@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
 
+from jffsr.dynamics.base_mode import FLOATING
 from jffsr.trajectories.interface import Trajectory
 from jffsr.types import Array, Scalar
 
@@ -33,7 +34,8 @@ class Motion:
     time (N + 1,), s; base_position (N + 1, 3), m, and base_quaternion (N + 1, 4), B to I; base_twist
     (N + 1, 6), [linear; angular] in I; joint_position, joint_velocity, joint_acceleration (N + 1, n);
     momentum (6,), P and L about the system centre of mass; joint_grid, the same joint motion on the finer
-    grid of 2N + 1 points, from which peaks are read.
+    grid of 2N + 1 points, from which peaks are read. base_mode, static, says how the base was held: with the
+    attitude held only P is the robot's own, on a fixed base neither.
     """
 
     time: Array
@@ -45,6 +47,7 @@ class Motion:
     joint_acceleration: Array
     momentum: Array
     joint_grid: JointGrid
+    base_mode: str = field(default=FLOATING, metadata={"static": True})
 
 
 def sample_joints(trajectory: Trajectory, duration: Scalar, num_steps: int) -> JointGrid:

@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.dynamics.base_mode import FLOATING
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.dynamics.momentum import base_twist
 from jffsr.robots.robot import Robot
@@ -38,6 +39,7 @@ def reference_rollout(
     duration: Scalar | float | None = None,
     num_steps: int = 200,
     momentum: Twist | None = None,
+    base_mode: str = FLOATING,
 ) -> Motion:
     """Motion with the arguments and result of `rollout`, by independent code."""
     grid = sample_joints(trajectory, check_duration(trajectory, duration), check_steps(num_steps))
@@ -47,7 +49,7 @@ def reference_rollout(
     def slope(pose: Array, joints: tuple[Array, Array]) -> tuple[Array, Twist]:
         q, qd = joints
         state = State(base_position=pose[:3], base_quaternion=pose[3:], joint_position=q)
-        nu = base_twist(robot, kinematics(robot, state), qd, momentum)
+        nu = base_twist(robot, kinematics(robot, state), qd, momentum, base_mode)
         spin = jnp.concatenate([jnp.zeros(1), nu[3:]])
         return jnp.concatenate([nu[:3], 0.5 * quaternion_multiply(spin, pose[3:])]), nu
 
@@ -82,4 +84,5 @@ def reference_rollout(
         joint_acceleration=grid.joint_acceleration[::2],
         momentum=momentum,
         joint_grid=grid,
+        base_mode=base_mode,
     )

@@ -7,6 +7,7 @@ from numbers import Integral
 import jax
 import jax.numpy as jnp
 
+from jffsr.dynamics.base_mode import FLOATING, base_freedom
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -32,6 +33,7 @@ def rollout(
     duration: Scalar | float | None = None,
     num_steps: int = 200,
     momentum: Twist | None = None,
+    base_mode: str = FLOATING,
 ) -> Motion:
     """Motion of the robot while its joints follow the trajectory and no external force acts.
 
@@ -39,9 +41,12 @@ def rollout(
     the base position follows from the straight line of the system centre of mass. `momentum` (6,) is P,
     N s, then L about the system centre of mass, N m s, in I; None means zero. `duration`, s, defaults to the
     trajectory's own. Of the initial state only the base pose is read: the joints are the trajectory's.
+    base_mode (static) is floating; attitude_held, where only P is conserved and L is not used; or fixed, where
+    the base stands still whatever the momentum. Raises InputError for another base_mode, for num_steps that
+    is no positive whole number, and for want of a duration.
     """
     grid = sample_joints(trajectory, check_duration(trajectory, duration), check_steps(num_steps))
-    return rollout_grid(robot, grid, initial_state, momentum)
+    return rollout_grid(robot, grid, initial_state, momentum, base_mode)
 
 
 def check_duration(trajectory: Trajectory, duration: Scalar | float | None) -> Scalar | float:
@@ -61,34 +66,74 @@ def check_steps(num_steps: int) -> int:
 
 
 def rollout_grid(
-    robot: Robot, grid: JointGrid, initial_state: State, momentum: Twist | None = None
+    robot: Robot,
+    grid: JointGrid,
+    initial_state: State,
+    momentum: Twist | None = None,
+    base_mode: str = FLOATING,
 ) -> Motion:
     """The same for joint motion already sampled on 2N + 1 points."""
-    terms = joint_terms(robot, grid.joint_position, grid.joint_velocity)
+    freedom = base_freedom(base_mode)
     momentum = jnp.zeros(6) if momentum is None else jnp.asarray(momentum)
-    initial = jnp.asarray(initial_state.base_quaternion)
-    components = _integrate_attitude(terms, grid.time[2] - grid.time[0], initial, momentum[3:])
-
-    time = grid.time[::2]
-    rotation = quaternion_rows(components)
-    samples = jax.tree.map(lambda x: x[::2], terms)
-    drift = tuple(momentum[:3] / jnp.sum(jnp.asarray(robot.mass)))
-    offset = rows_times(rotation, samples.com)
-    start = jnp.asarray(initial_state.base_position)
-    position = tuple(start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3))
-    omega_B = samples.base_rate(rows_transposed_times(rotation, tuple(momentum[3:])))
-    swing = rows_times(rotation, add(cross(omega_B, samples.com), samples.com_velocity))
-    velocity = subtract(drift, swing)
+    if freedom == 0:
+        position, quaternion, twist = _still(initial_state, grid)
+    else:
+        position, quaternion, twist = _free(robot, grid, initial_state, momentum, freedom == 6)
     return Motion(
-        time=time,
-        base_position=jnp.stack(position, axis=-1),
-        base_quaternion=jnp.stack(components, axis=-1),
-        base_twist=jnp.stack([*velocity, *rows_times(rotation, omega_B)], axis=-1),
+        time=grid.time[::2],
+        base_position=position,
+        base_quaternion=quaternion,
+        base_twist=twist,
         joint_position=grid.joint_position[::2],
         joint_velocity=grid.joint_velocity[::2],
         joint_acceleration=grid.joint_acceleration[::2],
         momentum=momentum,
         joint_grid=grid,
+        base_mode=base_mode,
+    )
+
+
+def _still(initial_state: State, grid: JointGrid) -> tuple[Array, Array, Array]:
+    """Base position (N + 1, 3), quaternion (N + 1, 4) and twist (N + 1, 6) of a base that never moves."""
+    samples = len(grid.time[::2])
+    position, quaternion = (
+        jnp.asarray(initial_state.base_position),
+        jnp.asarray(initial_state.base_quaternion),
+    )
+    return (
+        jnp.broadcast_to(position, (samples, 3)),
+        jnp.broadcast_to(quaternion, (samples, 4)),
+        jnp.zeros((samples, 6)),
+    )
+
+
+def _free(
+    robot: Robot, grid: JointGrid, initial_state: State, momentum: Twist, turning: bool
+) -> tuple[Array, Array, Array]:
+    """The same for a base that gives way, and turns or keeps its attitude."""
+    terms = joint_terms(robot, grid.joint_position, grid.joint_velocity)
+    initial = jnp.asarray(initial_state.base_quaternion)
+    samples = jax.tree.map(lambda x: x[::2], terms)
+    time = grid.time[::2]
+    if turning:
+        components = _integrate_attitude(terms, grid.time[2] - grid.time[0], initial, momentum[3:])
+        rotation = quaternion_rows(components)
+        omega_B = samples.base_rate(rows_transposed_times(rotation, tuple(momentum[3:])))
+    else:
+        components = tuple(jnp.broadcast_to(part, time.shape) for part in initial)
+        rotation = quaternion_rows(components)
+        omega_B = (jnp.zeros_like(time),) * 3
+
+    drift = tuple(momentum[:3] / jnp.sum(jnp.asarray(robot.mass)))
+    offset = rows_times(rotation, samples.com)
+    start = jnp.asarray(initial_state.base_position)
+    position = tuple(start[k] + offset[k][0] + drift[k] * time - offset[k] for k in range(3))
+    swing = rows_times(rotation, add(cross(omega_B, samples.com), samples.com_velocity))
+    velocity = subtract(drift, swing)
+    return (
+        jnp.stack(position, axis=-1),
+        jnp.stack(components, axis=-1),
+        jnp.stack([*velocity, *rows_times(rotation, omega_B)], axis=-1),
     )
 
 

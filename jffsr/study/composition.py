@@ -22,7 +22,7 @@ from jffsr.study.lookup import shown, with_suffixes
 MAX_FILES = 50
 MAX_LEVELS = 10
 _OVERRIDE_KEY = re.compile(r"[A-Za-z_]\w*(\.\w+){0,20}", re.ASCII)
-_FILE_ENDINGS = (".yaml", ".yml", ".urdf", ".xml")
+_FILE_ENDINGS = (".yaml", ".yml", ".urdf", ".xml", ".mjcf")
 
 
 def compose(path: Path, overrides: Sequence[str]) -> tuple[dict[str, Any], Sources]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.dynamics.base_mode import FLOATING
 from jffsr.errors import InputError
 from jffsr.planning.problem import Problem
 from jffsr.study.atomic import write_json
@@ -38,6 +39,11 @@ def check_run(path: str | Path, steps: tuple[float, ...] = (2e-3, 1e-3)):
     from jffsr.crosscheck.compare import crosscheck
 
     folder, problem, dataset = open_run(path)
+    if problem.base_mode != FLOATING:
+        raise InputError(
+            f"{folder.config}: rollout.base_mode is '{problem.base_mode}'; only floating bases are driven in MuJoCo "
+            f"and MJX"
+        )
     trajectory = problem.trajectory.with_free(dataset["free_numbers"].to_numpy())
     report = crosscheck(
         problem.robot,

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import PrivateAttr, model_validator
 
+from jffsr.dynamics.base_mode import ATTITUDE_HELD, FIXED
 from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
@@ -44,6 +45,13 @@ class PlanningConfig(Section):
         if not self.enabled_terms:
             sentence = "no term counts (an excursion only under a limit), at least one is expected"
             raise conflict(sentence, "objective")
+        mode, task = self.rollout.base_mode, self.task
+        lost = {ATTITUDE_HELD: ("angular",), FIXED: ("linear", "angular")}.get(mode, ())
+        for key in (f"{kind}_momentum" for kind in lost):
+            if any(getattr(task, key)):
+                found = list(getattr(task, key))
+                sentence = f"found {found}, rollout.base_mode '{mode}' does not keep it, leave it out"
+                raise conflict(sentence, f"task.{key}")
         return self
 
     def term_enabled(self, name: str) -> bool:

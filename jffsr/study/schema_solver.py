@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
+from jffsr.dynamics.base_mode import BASE_MODES, FLOATING
 from jffsr.reading.section import Section
 from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
 
@@ -25,9 +26,10 @@ class Trajectory(Section):
 
 
 class Rollout(Section):
-    """Steps of the base motion's integration."""
+    """Steps of the base motion's integration, and how the base is held meanwhile."""
 
     num_steps: Annotated[int, whole(4, 100_000)] = 100
+    base_mode: Annotated[Literal["floating", "attitude_held", "fixed"], choice(*BASE_MODES)] = FLOATING
 
 
 class Optimizer(Section):

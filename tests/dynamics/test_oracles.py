@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jffsr.dynamics.equations_of_motion import bias_force, forward_dynamics, inverse_dynamics
 from jffsr.dynamics.kinematics import end_effector_pose, jacobians, kinematics, system_com
 from jffsr.dynamics.momentum import (
     base_twist,
@@ -26,6 +27,8 @@ QUANTITIES = [
     "H_b", "H_bm", "H_m", "H_reduced", "system_com", "momentum", "base_twist_zero_momentum",
     "base_twist_given_momentum", "kinetic_energy", "kinetic_energy_zero_momentum", "tool_position",
     "tool_rotation", "tool_quaternion", "tool_twist", "J_b", "J_m", "GJM", "tool_twist_zero_momentum",
+    "bias_c", "bias_c_zero_momentum", "acceleration", "acceleration_zero_momentum", "inverse_torque",
+    "inverse_base_acceleration",
 ]  # fmt: skip
 
 
@@ -39,6 +42,7 @@ def _inputs(cases: list[dict]) -> dict[str, np.ndarray]:
     read = {key: np.array([c["inputs"][key] for c in cases]) for key in cases[0]["inputs"]}
     com = np.array([c["outputs"]["system_com"] for c in cases])
     about_com = read["given_L_origin"] - np.cross(com, read["given_P"])
+    read["their_joint_acceleration"] = np.array([c["outputs"]["acceleration"][6:] for c in cases])
     read["given_momentum"] = np.concatenate([read["given_P"], about_com], axis=1)
     return read
 
@@ -48,6 +52,9 @@ def _expected(cases: list[dict]) -> dict[str, np.ndarray]:
     tool = [o["end_effectors"][0] for o in out]
     expected = {key: np.array([o[key] for o in out]) for key in QUANTITIES if key in out[0]}
     expected["momentum"] = np.array([o["total_P"] + o["total_L_com"] for o in out])
+    # Inverse dynamics is given their joint accelerations, and must find their torques and base acceleration.
+    expected["inverse_torque"] = np.array([c["inputs"]["tau"] for c in cases])
+    expected["inverse_base_acceleration"] = expected["acceleration"][:, :6]
     for ours, theirs in (
         ("tool_position", "position"), ("tool_rotation", "R"), ("tool_quaternion", "quat_wxyz"),
         ("tool_twist", "twist"), ("J_b", "J_b"), ("J_m", "J_m"), ("GJM", "GJM"),
@@ -69,7 +76,15 @@ def _evaluate(robot, inputs):
     j_b, j_m = jacobians(robot, kin)
     position, quaternion = end_effector_pose(robot, kin)
     still = base_twist(robot, kin, qd)
+    torque = inputs["tau"]
+    inverse_torque, reaction = inverse_dynamics(robot, kin, nu, qd, inputs["their_joint_acceleration"])
     return {
+        "bias_c": bias_force(robot, kin, nu, qd),
+        "bias_c_zero_momentum": bias_force(robot, kin, still, qd),
+        "acceleration": forward_dynamics(robot, kin, nu, qd, torque),
+        "acceleration_zero_momentum": forward_dynamics(robot, kin, still, qd, torque),
+        "inverse_torque": inverse_torque,
+        "inverse_base_acceleration": reaction,
         "H_b": h_b,
         "H_bm": h_bm,
         "H_m": h_m,

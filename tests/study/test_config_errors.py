@@ -51,9 +51,15 @@ ADDED = {
     "a pair [low, high] with low < high is expected",
     "limits: {base_excursion: [1, 2]}\n": "x.yaml:7: limits.base_excursion: found [1, 2], "
     "a list of 3 numbers > 0 (one per axis) is expected",
-    "rollout: 3\n": "x.yaml:7: rollout: found 3, a mapping of num_steps is expected",
+    "rollout: 3\n": "x.yaml:7: rollout: found 3, a mapping of num_steps, base_mode is expected",
     "rollout: {num_steps: 3}\n": "x.yaml:7: rollout.num_steps: found 3, "
     "a whole number in [4, 100000] is expected",
+    "rollout: {base_mode: fixd}\n": "x.yaml:7: rollout.base_mode: found 'fixd', "
+    "'floating', 'attitude_held' or 'fixed' is expected; did you mean 'fixed'?",
+    "  angular_momentum: [0, 0, 1]\nrollout: {base_mode: attitude_held}\n": "x.yaml:7: "
+    "task.angular_momentum: found [0.0, 0.0, 1.0], rollout.base_mode 'attitude_held' does not keep it, leave it out",
+    "  linear_momentum: [0, 2, 0]\nrollout: {base_mode: fixed}\n": "x.yaml:7: "
+    "task.linear_momentum: found [0.0, 2.0, 0.0], rollout.base_mode 'fixed' does not keep it, leave it out",
     "optimizer: {kind: qspo}\n": "x.yaml:7: optimizer.kind: found 'qspo', "
     "'qpso', 'hybrid' or 'gradient' is expected; did you mean 'qpso'?",
     "optimizer: {particles: 500}\n": "x.yaml:7: optimizer.swarm_evaluations: found 200, "

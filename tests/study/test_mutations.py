@@ -18,7 +18,6 @@ from jffsr.study.building import build_problem
 from jffsr.study.config import load_config
 
 CONFIGS = sorted(Path("configs/planning").glob("*.yaml"))
-ROBOTS = sorted(Path(str(resources.files("jffsr.robots") / "data")).glob("*.yaml"))
 PLANAR = """
 kind: planning
 robot: ROBOT
@@ -34,6 +33,8 @@ STUDIES = {
     .read_text()
     .replace("servicer_7dof", "ROBOT"),
 }
+DATA = Path(str(resources.files("jffsr.robots") / "data"))
+ROBOTS = sorted(path for path in DATA.glob("*.yaml") if path.stem in STUDIES)
 SHARES = 10
 SECONDS = 5.0
 
