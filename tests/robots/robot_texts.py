@@ -24,6 +24,6 @@ def cube_obj() -> str:
     return "\n".join(lines) + "\n"
 
 
-DATA = Path(__file__).parent.parent / "data" / "robots"
-URDF = (DATA / "satellite.urdf").read_text(encoding="utf-8")
-MJCF = (DATA / "two_armed.xml").read_text(encoding="utf-8")
+DATA = Path(__file__).parent.parent / "data"
+URDF = (DATA / "robots" / "satellite.urdf").read_text(encoding="utf-8")
+MJCF = (DATA / "robots" / "two_armed.xml").read_text(encoding="utf-8")

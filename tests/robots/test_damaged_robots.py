@@ -14,8 +14,7 @@ import numpy as np
 import plain_reading
 import pytest
 import xml_mutations
-from conftest import DATA
-from robot_texts import MJCF, URDF, cube_stl
+from robot_texts import DATA, MJCF, URDF, cube_stl
 
 import jffsr
 from jffsr.errors import InputError
@@ -268,7 +267,10 @@ def originals():
     found += [(".urdf", URDF), (".xml", whole), (".xml", whole)]
     catalogue = Path(jffsr.__file__).parent / "robots" / "data"
     for path in [*sorted(catalogue.glob("*.yaml")), *sorted((DATA / "robots").glob("*.yaml"))]:
-        found.append((".yaml", path.read_text(encoding="utf-8")))
+        text = path.read_text(encoding="utf-8")
+        # Robots made of robots are damaged in a test of their own.
+        if "\narms:" not in text:
+            found.append((".yaml", text))
     for name in ("wu_2018_6dof", "servicer_7dof", DATA / "robots" / "two_arms.yaml"):
         robot = jffsr.load_robot(name)
         found += [(".urdf", jffsr.to_urdf(robot)), (".xml", jffsr.to_mjcf(robot))]

@@ -6,9 +6,8 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from conftest import DATA
 from mujoco_reference import MujocoReference, inertia_matrix, random_state
-from robot_texts import MJCF, URDF, cube_stl
+from robot_texts import DATA, MJCF, URDF, cube_stl
 
 import jffsr
 from jffsr.errors import InputError

@@ -8,9 +8,8 @@ import chex
 import jax
 import numpy as np
 import pytest
-from conftest import DATA
 from mujoco_reference import assert_same_inertia, random_state
-from robot_texts import CUBE, URDF, cube_stl
+from robot_texts import CUBE, DATA, URDF, cube_stl
 
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.errors import InputError
