@@ -23,16 +23,14 @@ def to_mjcf(robot: Robot) -> str:
     Without gravity, on a free base whose frame is that of the file's root link, with a motor at every
     joint, end effectors as sites, and shapes as geoms of no mass; meshes stand in the text itself. Limits
     of position and torque are the joints' own; those of velocity and acceleration, for which MJCF has no
-    attribute, stand as numbers named `velocity_limit:JOINT` under <custom>. Inertias are given by principal
-    moments and axes, which MuJoCo takes as they are.
+    attribute, stand as numbers named `velocity_limit:JOINT` under <custom>, as does the order of joints and
+    end effectors where it is not that of the bodies. Inertias are given by principal moments and axes,
+    which MuJoCo takes as they are.
     """
     top = robot.topology
     model = ET.Element("mujoco", model=safe_name(robot.name))
     ET.SubElement(model, "compiler", angle="radian", inertiafromgeom="false", fusestatic="false")
     ET.SubElement(model, "option", gravity="0 0 0", integrator="RK4")
-    custom = _custom(robot)
-    if len(custom):
-        model.append(custom)
     meshes = [shape for shape in robot.geometry.shapes if shape.kind == MESH]
     asset = ET.SubElement(model, "asset") if meshes else None
     taken: set[str] = set()
@@ -59,14 +57,26 @@ def to_mjcf(robot: Robot) -> str:
             position = shape.position - (np.asarray(robot.root_position) if body == 0 else 0)
             _geom(element, shape, position, names[id(shape)])
     _sites(elements, robot)
+    custom = _custom(robot, world)
+    if len(custom):
+        model.insert(2, custom)
     actuator = ET.SubElement(model, "actuator")
     for name in top.joint_names:
         ET.SubElement(actuator, "motor", name=safe_name(name), joint=safe_name(name))
     return xml_text(model)
 
 
-def _custom(robot: Robot) -> ET.Element:
+def _custom(robot: Robot, world: ET.Element) -> ET.Element:
+    """Limits of rate and acceleration, and the order of joints and sites where the text has another."""
     custom = ET.Element("custom")
+    for kind, tag, names in (
+        ("joint_number", "joint", robot.joint_names),
+        ("end_effector_number", "site", robot.end_effector_names),
+    ):
+        safe = [safe_name(name) for name in names]
+        if [element.get("name") for element in world.iter(tag)] != safe:
+            for number, name in enumerate(safe):
+                ET.SubElement(custom, "numeric", name=f"{kind}:{name}", data=str(number))
     for kind in ("velocity", "acceleration"):
         for name, value in zip(robot.joint_names, getattr(robot.limits, kind), strict=True):
             if np.isfinite(value):

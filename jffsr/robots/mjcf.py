@@ -113,6 +113,8 @@ class _Reader:
         moving = range(1, model.nbody)
         links = [self._link(body) for body in moving]
         joints = [self._joint(body) for body in moving if body != self.base]
+        number = self.prepared.numbers["joint_number"]
+        joints.sort(key=lambda joint: number.get(joint.name, 0))
         shapes, left_out = read_shapes(self.spec, model, self.bodies, self.shift)
         name = self.spec.modelname
         tools = self._sites() or leaf_end_effectors(links, joints, self.bodies[1:])
@@ -240,8 +242,8 @@ class _Reader:
             rotation=rotation,
             axis=axis,
             position_limit=(low if low > -UNLIMITED else -np.inf, high if high < UNLIMITED else np.inf),
-            velocity_limit=self.prepared.velocity_limits.get(name, np.inf),
-            acceleration_limit=self.prepared.acceleration_limits.get(name, np.inf),
+            velocity_limit=self.prepared.numbers["velocity_limit"].get(name, np.inf),
+            acceleration_limit=self.prepared.numbers["acceleration_limit"].get(name, np.inf),
             torque_limit=self._torque(joint),
         )
 
@@ -270,7 +272,8 @@ class _Reader:
             position = model.site_pos[site] - self.shift[body]
             rotation = quaternion_to_matrix(model.site_quat[site])
             found.append(EndEffectorDescription(names[site], self.bodies[body], position, rotation))
-        return tuple(found)
+        number = self.prepared.numbers["end_effector_number"]
+        return tuple(sorted(found, key=lambda tool: number.get(tool.name, 0)))
 
 
 def _new(name: str, taken: set[str]) -> str:

@@ -55,6 +55,9 @@ _FINITE = (
     "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "axis", "ref", "mass", "diaginertia", "fullinertia",
     "size", "fromto", "density", "scale", "refpos", "refquat",
 )  # fmt: skip
+NUMBERS = ("velocity_limit", "acceleration_limit", "joint_number", "end_effector_number")
+"""What MJCF has no place for: `jffsr.to_mjcf` writes it under <custom>, as numbers named KIND:NAME."""
+
 _NAMES = ("name", "class", "childclass", "model", "file", "mesh", "material")
 _NAN = re.compile(r"[+-]?nan(\(.*\))?", re.IGNORECASE)
 
@@ -65,8 +68,7 @@ class Prepared:
 
     text: str = ""
     nodes: list[Node] = field(default_factory=list)
-    velocity_limits: dict[str, float] = field(default_factory=dict)
-    acceleration_limits: dict[str, float] = field(default_factory=dict)
+    numbers: dict[str, dict[str, float]] = field(default_factory=lambda: {kind: {} for kind in NUMBERS})
     notes: list[str] = field(default_factory=list)
 
     def blame(self, line: int, shown: str) -> str:
@@ -135,20 +137,14 @@ def _include(node: Node, folder: Path, stack: list[str], count: list[int]) -> No
 
 
 def _read_custom(root: Node, prepared: Prepared) -> None:
-    """Limits that MJCF has no attribute for; `jffsr.to_mjcf` writes them as numbers of the user's."""
     for section in root.all("custom"):
         for node in section.all("numeric"):
-            kind, _, joint = node.get("name").partition(":")
-            store = {
-                "velocity_limit": prepared.velocity_limits,
-                "acceleration_limit": prepared.acceleration_limits,
-            }.get(kind)
-            if store is not None and joint:
+            kind, _, name = node.get("name").partition(":")
+            if kind in NUMBERS and name:
                 if not NUMBER.fullmatch(node.get("data").strip()):
-                    raise InputError(
-                        f"{node.place}: joint '{joint}': {kind} is {node.get('data')!r}; a number expected"
-                    )
-                store[joint] = float(node.get("data"))
+                    said = f"{kind} of '{name}' is {node.get('data')!r}; a number expected"
+                    raise InputError(f"{node.place}: {said}")
+                prepared.numbers[kind][name] = float(node.get("data"))
 
 
 def _refuse(root: Node) -> None:

@@ -6,8 +6,9 @@ import jax
 import mujoco
 import numpy as np
 
-from jffsr.dynamics.kinematics import kinematics
+from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.dynamics.momentum import inertia_blocks
+from jffsr.robots.geometry import Geometry
 from jffsr.robots.state import State
 
 
@@ -75,14 +76,19 @@ def random_state(robot, seed):
 
 
 @jax.jit
-def _blocks(robot, state):
-    return inertia_blocks(robot, kinematics(robot, state))
+def _evaluate(robot, state):
+    kin = kinematics(robot, state)
+    tools = {name: end_effector_pose(robot, kin, name) for name in robot.end_effector_names}
+    return inertia_blocks(robot, kin), tools
 
 
-def inertia_matrix(robot, state):
-    """The blocks of `jffsr.inertia_blocks` as one matrix."""
-    base, coupling, joints = (np.asarray(block) for block in _blocks(robot, state))
-    return np.block([[base, coupling], [coupling.T, joints]])
+def evaluate(robot, state):
+    """The blocks of `jffsr.inertia_blocks` as one matrix, and the poses of the end effectors by name."""
+    # Without shapes, so that a robot and what is read back of it share the compiled program.
+    blocks, tools = _evaluate(robot.replace(geometry=Geometry()), state)
+    base, coupling, joints = (np.asarray(block) for block in blocks)
+    poses = {name: tuple(np.asarray(part) for part in pose) for name, pose in tools.items()}
+    return np.block([[base, coupling], [coupling.T, joints]]), poses
 
 
 def assert_same_inertia(path, robot, seeds=range(3), base=None):
@@ -93,6 +99,6 @@ def assert_same_inertia(path, robot, seeds=range(3), base=None):
         reference.set(robot, state)
         expected = reference.inertia()
         np.testing.assert_allclose(
-            inertia_matrix(robot, state), expected, rtol=0, atol=1e-10 * np.abs(expected).max()
+            evaluate(robot, state)[0], expected, rtol=0, atol=1e-10 * np.abs(expected).max()
         )
     return reference

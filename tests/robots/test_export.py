@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from mujoco_reference import MujocoReference, inertia_matrix, random_state
+from mujoco_reference import MujocoReference, evaluate, random_state
 from robot_texts import DATA, MJCF, URDF, cube_stl
 
 import jffsr
@@ -29,21 +29,15 @@ def load(name):
     return jffsr.load_robot(name if name in jffsr.list_robots() else DATA / "robots" / f"{name}.yaml")
 
 
-def pose_of(robot, state, tool):
-    position, quaternion = jffsr.end_effector_pose(robot, jffsr.kinematics(robot, state), tool)
-    return np.asarray(position), np.asarray(quaternion)
-
-
 def assert_same_robot(ours, theirs, inertia=1e-12):
     assert ours.topology == theirs.topology
     for seed in range(2):
         state = random_state(ours, seed)
-        expected = inertia_matrix(theirs, state)
-        scale = np.abs(expected).max()
-        np.testing.assert_allclose(inertia_matrix(ours, state), expected, rtol=0, atol=inertia * scale)
-    for tool in theirs.end_effector_names:
-        for found, expected in zip(pose_of(ours, state, tool), pose_of(theirs, state, tool), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+        (found, found_poses), (expected, poses) = evaluate(ours, state), evaluate(theirs, state)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=inertia * np.abs(expected).max())
+        for tool, pose in poses.items():
+            for a, b in zip(found_poses[tool], pose, strict=True):
+                np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
     for name, limit in vars(theirs.limits).items():
         np.testing.assert_array_equal(getattr(ours.limits, name), limit, err_msg=name)
     np.testing.assert_allclose(ours.root_position, theirs.root_position, rtol=0, atol=1e-15)
@@ -69,16 +63,15 @@ def test_mujoco_reads_the_same_robot(name, suffix, tmp_path):
         state = random_state(robot, seed)
         reference.set(robot, state)
         expected = reference.inertia()
-        np.testing.assert_allclose(
-            inertia_matrix(robot, state), expected, rtol=0, atol=1e-11 * np.abs(expected).max()
-        )
+        found, poses = evaluate(robot, state)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
     if suffix == ".xml":
         motors = [reference.model.actuator(i).name for i in range(reference.model.nu)]
         assert motors == list(robot.joint_names)
         for tool in robot.end_effector_names:
-            position, quaternion = pose_of(robot, state, tool)
-            found, rotation = reference.site(tool)
-            np.testing.assert_allclose(found, position, rtol=0, atol=1e-12)
+            position, quaternion = poses[tool]
+            place, rotation = reference.site(tool)
+            np.testing.assert_allclose(place, position, rtol=0, atol=1e-12)
             np.testing.assert_allclose(rotation, quaternion_to_matrix(quaternion), rtol=0, atol=1e-12)
 
 
@@ -160,6 +153,27 @@ def test_a_urdf_whose_tools_are_its_leaf_links_reads_back(tmp_path):
     jffsr.save_robot(robot, tmp_path / "robot.urdf")
     assert 'name="b_link"' not in (tmp_path / "robot.urdf").read_text()
     assert_same_robot(jffsr.load_robot(tmp_path / "robot.urdf"), robot)
+
+
+def test_joints_and_tools_keep_an_order_that_is_not_that_of_the_bodies(tmp_path):
+    """Two arms grown in turns: both files have the joints and tools as the robot has them."""
+    names = ["base", "a1", "b1", "a2", "b2"]
+    links = [
+        LinkDescription(name, 2.0 + i, np.array([0.1 * i, 0, 0.2]), np.eye(3)) for i, name in enumerate(names)
+    ]
+    joints = [
+        JointDescription(
+            f"to_{child}", "revolute", parent, child, np.ones(3), np.eye(3), np.array([0.0, 0, 1])
+        )
+        for parent, child in (("base", "a1"), ("base", "b1"), ("a1", "a2"), ("b1", "b2"))
+    ]
+    tools = [
+        EndEffectorDescription(f"on_{name}", name, np.ones(3), np.eye(3)) for name in ("b2", "base", "a1")
+    ]
+    robot = build_robot(RobotDescription("turns", "test", tuple(links), tuple(joints), tuple(tools)))
+    for suffix in SUFFIXES[:2]:
+        jffsr.save_robot(robot, tmp_path / f"robot{suffix}")
+        assert_same_robot(jffsr.load_robot(tmp_path / f"robot{suffix}"), robot)
 
 
 def test_names_that_xml_escapes(tmp_path):
