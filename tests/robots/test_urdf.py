@@ -245,6 +245,21 @@ def test_mesh_names(tmp_path):
     assert "a.dae: meshes of type '.dae' are not read (STL and OBJ are)" in describe_robot(path).notes
 
 
+def test_a_urdf_may_be_an_arm_of_a_robot_file(satellite):
+    twin = satellite.with_name("twin.yaml")
+    twin.write_text(
+        "name: twin\n"
+        "base: {name: base, mass: 300.0, inertia: {xx: 80, yy: 80, zz: 80}}\n"
+        "arms:\n"
+        "  - {robot: satellite.urdf, position: [0, 0.5, 0], prefix: left_, base: drop}\n"
+        "  - {robot: satellite.urdf, position: [0, -0.5, 0], prefix: right_, base: drop}\n",
+        encoding="utf-8",
+    )
+    robot, arm = load_robot(twin), load_robot(satellite)
+    assert robot.joint_names == ("left_j1", "left_j2", "left_j3", "right_j1", "right_j2", "right_j3")
+    np.testing.assert_array_equal(robot.mass, [300, *arm.mass[1:], *arm.mass[1:]])
+
+
 def test_files_of_another_type_are_refused(tmp_path):
     for name in ("arm.sdf", "arm.urdf.xacro", "arm"):
         (tmp_path / name).write_text("<sdf/>")
