@@ -20,7 +20,7 @@ def find_mesh(filename: str, folder: Path) -> Path | None:
     A package:// name is looked for below the file's folder and each folder above it, with the package's
     name and without.
     """
-    scheme, _, rest = filename.rpartition("://")
+    scheme, _, rest = filename.replace("\\", "/").rpartition("://")
     if scheme in ("package", "model"):
         _, _, within = rest.partition("/")
         above = (folder.absolute(), *folder.absolute().parents)
@@ -57,7 +57,8 @@ def read_mesh(path: Path, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     try:
         model = spec.compile()
     except ValueError as error:
-        raise InputError(f"{path.name}: {' '.join(str(error).split())}") from None
+        words = " ".join(str(error).split()).removeprefix("Error: ").partition(" Element name ")[0]
+        raise InputError(f"{path.name}: {words}") from None
     return compiled_mesh(model, 0)
 
 

@@ -236,7 +236,15 @@ def test_absent_limits(tmp_path):
 
 def test_mesh_names(tmp_path):
     """A file name that no folder can hold is a missing mesh, not a defect."""
-    names = ["package://x", "package://", "file:///nowhere/a.stl", "a" * 5000, "../" * 50 + "a.stl", "a.dae"]
+    names = [
+        "package://bad\\\\x.stl",
+        "package://x",
+        "package://",
+        "file:///nowhere/a.stl",
+        "a" * 5000,
+        "../" * 50 + "a.stl",
+        "a.dae",
+    ]
     visuals = "".join(f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in names)
     (tmp_path / "a.dae").write_text("<COLLADA/>")
     base = link("base").replace("</link>", visuals + "</link>")
