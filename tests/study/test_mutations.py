@@ -18,7 +18,7 @@ from jffsr.study.building import build_problem
 from jffsr.study.config import load_config
 
 CONFIGS = sorted(Path("configs/planning").glob("*.yaml"))
-ROBOTS = sorted(Path(str(resources.files("jffsr.robots") / "data")).glob("*.yaml"))
+DATA = Path(str(resources.files("jffsr.robots") / "data"))
 PLANAR = """
 kind: planning
 robot: ROBOT
@@ -34,6 +34,8 @@ STUDIES = {
     .read_text()
     .replace("servicer_7dof", "ROBOT"),
 }
+# These robots have every form that a file can take; each further one would have to be compiled anew.
+ROBOTS = [DATA / f"{name}.yaml" for name in sorted(STUDIES)]
 SHARES = 10
 SECONDS = 5.0
 
