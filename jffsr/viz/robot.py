@@ -10,7 +10,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from jffsr.errors import InputError
 from jffsr.robots.geometry import MESH, VISUAL
@@ -19,7 +18,7 @@ from jffsr.viz.labels import draw_labels, label_widths
 from jffsr.viz.scene import Scene, scene_at
 from jffsr.viz.solids import capsule_between, outward, refined, shape_faces
 from jffsr.viz.style import COLOURS, legend_above, new_figure, styled
-from jffsr.viz.view import across_view, fill, frame_plane, frame_space, viewpoint
+from jffsr.viz.view import across_view, fill, flatten, frame_plane, frame_space, viewpoint
 
 _WIDTH = 4.6  # in
 _TALLEST = 3.9
@@ -29,6 +28,13 @@ _LINKS = ((0.53, 0.67, 0.83, 1.0), (0.86, 0.89, 0.93, 1.0))  # in turn, so that 
 _JOINT = {"color": COLOURS[5], "linewidth": 1.1}
 _COM = {"color": COLOURS[0], "linestyle": "none", "marker": "o", "markersize": 5.5, "fillstyle": "none"}
 _TOOL_AXES = (COLOURS[2], COLOURS[3], COLOURS[1])
+
+
+class _Sorted(PolyCollection):
+    """Faces that lie on the page and in order already, where axes in three dimensions would sort again."""
+
+    def do_3d_projection(self) -> float:
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ def _least_folded(scene: Scene) -> int:
 def _draw(robot: Robot, scene: Scene, sample: int) -> Figure:
     joints, tools, com = scene.joints[sample], scene.tools[sample], scene.com[sample]
     solids = solids_of(robot, scene, sample)
-    points = np.concatenate([faces.reshape(-1, 3) for faces, _, _ in solids])
+    points = np.concatenate([faces.reshape(-1, 3) for faces, *_ in solids])
     reach = np.ptp(points, axis=0).max()
     arm = max(np.ptp(np.concatenate([joints, tools]), axis=0).max(), 0.2 * reach)
     axes_ends = joints + np.multiply.outer([-1.0, 1.0], 0.055 * arm * scene.joint_axes[sample])
@@ -147,23 +153,23 @@ def _legend(tool_axes: int) -> tuple[list[Line2D], list[str]]:
     return handles, [*labels, "centre of mass"]
 
 
-def solids_of(robot: Robot, scene: Scene, sample: int) -> list[tuple[np.ndarray, tuple, bool]]:
-    """One entry a shape: faces (f, 4, 3) in I, their colour, and whether their backs are sure to be hidden."""
+def solids_of(robot: Robot, scene: Scene, sample: int) -> list[tuple[np.ndarray, tuple, bool, bool]]:
+    """One entry a shape: faces (f, 4, 3) in I, colour, whether no back can be seen, whether on the base."""
     found, bare = [], []
     for body, name in enumerate(robot.body_names):
         shapes = robot.geometry.on_body(name, VISUAL)
         for shape in shapes:
             faces = shape_faces(shape) @ scene.rotation[sample, body].T + scene.origin[sample, body]
-            found.append((faces, shape.colour or _colour(body), shape.kind != MESH))
+            found.append((faces, shape.colour or _colour(body), shape.kind != MESH, body == 0))
         if not shapes:
             bare.append(body)
     if 0 in bare:
-        found.append((scene.base_faces[sample], _colour(0), False))
-    lines = np.concatenate([scene.segments[sample].reshape(-1, 3), *(f.reshape(-1, 3) for f, _, _ in found)])
+        found.append((scene.base_faces[sample], _colour(0), False, True))
+    lines = np.concatenate([scene.segments[sample].reshape(-1, 3), *(f.reshape(-1, 3) for f, *_ in found)])
     radius = 0.012 * np.ptp(lines, axis=0).max()
     for body, (start, end) in zip(scene.owners, scene.segments[sample], strict=True):
         if body in bare and np.linalg.norm(end - start) > 0:
-            found.append((capsule_between(start, end, radius), _colour(int(body)), True))
+            found.append((capsule_between(start, end, radius), _colour(int(body)), True, body == 0))
     return found
 
 
@@ -172,15 +178,18 @@ def _colour(body: int) -> tuple:
 
 
 def _draw_solids(axes, solids: list, towards: np.ndarray, longest: float, size: int) -> None:
-    """All faces in one collection, since only within one does matplotlib know what hides what."""
+    """All faces, small, from the farthest to the nearest."""
     if size == 3:
         right, up = across_view(towards)
         light = towards + 0.8 * up - 0.5 * right
     else:
         light = np.array([-0.3, 0.5, 1.0])
     light = light / np.linalg.norm(light)
-    drawn, colours = [], []
-    for faces, colour, closed in solids:
+    hull = max(
+        (np.ptp(faces.reshape(-1, 3), axis=0).max() for faces, *_, base in solids if base), default=0.0
+    )
+    drawn, colours, depths = [], [], []
+    for faces, colour, closed, base in solids:
         small = refined(faces, longest)
         normals = outward(small)
         facing = normals @ towards
@@ -195,11 +204,12 @@ def _draw_solids(axes, solids: list, towards: np.ndarray, longest: float, size: 
         rgba[:, :3] *= bright[:, None]
         drawn.append(small)
         colours.append(rgba)
+        # What stands on the base touches its faces and must not be cut by the half of one that lies before.
+        back = 0.7 * longest if base and np.ptp(faces.reshape(-1, 3), axis=0).max() > 0.4 * hull else 0.0
+        depths.append(small.mean(axis=1) @ towards - back)
     faces, rgba = np.concatenate(drawn), np.concatenate(colours)
-    depth = np.argsort(faces.mean(axis=1) @ towards, kind="stable")
-    faces, rgba = faces[depth], rgba[depth]
+    order = np.argsort(np.concatenate(depths), kind="stable")
+    faces, rgba = faces[order], rgba[order]
+    flat = faces[..., :2] if size == 2 else flatten(axes, faces)
     style = {"facecolors": rgba, "edgecolors": rgba, "linewidths": 0.4, "zorder": 2}
-    if size == 3:
-        axes.add_collection3d(Poly3DCollection(faces, **style), autolim=False)
-    else:
-        axes.add_collection(PolyCollection(faces[..., :2], **style), autolim=False)
+    axes.add_collection(_Sorted(flat, **style), autolim=False)

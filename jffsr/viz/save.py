@@ -61,7 +61,9 @@ def save_picture(figure: Figure, path: Path) -> None:
         raise InputError(f"'{path}': a picture is written as .png, found the ending '{path.suffix}'")
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=_PICTURE_DPI)
-    picture = Image.open(buffer).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    # Maximum coverage keeps the few letters and thin lines of a colour apart from the large faces.
+    picture = Image.open(buffer).convert("RGB")
+    picture = picture.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
     try:
         _whole(path, partial(picture.save, format="png", optimize=True))
     except OSError as error:

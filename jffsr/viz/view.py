@@ -86,8 +86,13 @@ def _seen(axes, renderer) -> Bbox:
 def project(axes, points: np.ndarray) -> np.ndarray:
     """Where points (n, 3) of a view in three dimensions are seen, (n, 2), in pixels of the figure."""
     axes.apply_aspect()
-    x, y, _ = proj3d.proj_transform(*points.T, axes.get_proj())
-    return axes.transData.transform(np.stack([x, y], axis=1))
+    return axes.transData.transform(flatten(axes, points))
+
+
+def flatten(axes, points: np.ndarray) -> np.ndarray:
+    """Points (..., 3) of a view in three dimensions in its own two coordinates, (..., 2)."""
+    x, y, _ = proj3d.proj_transform(*points.reshape(-1, 3).T, axes.get_proj())
+    return np.stack([x, y], axis=-1).reshape(*points.shape[:-1], 2)
 
 
 def towards_reader(azimuth: float) -> np.ndarray:

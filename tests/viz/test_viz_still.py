@@ -85,7 +85,7 @@ def test_solids_stand_where_the_published_pose_puts_them(robots):
     """servicer_7dof at the start pose of Wang et al. 2021: the gripper lies behind the printed tool, unturned."""
     robot = robots["servicer_7dof"]
     scene = scene_at(robot, np.deg2rad([[0.0, -60, 0, 45, 0, -15, 0]]))
-    solids = [faces for faces, _, _ in solids_of(robot, scene, 0)]
+    solids = [faces for faces, *_ in solids_of(robot, scene, 0)]
     gripper = solids[-1].reshape(-1, 3)
     tool = np.array([1.078, 0.252, -1.853])
     np.testing.assert_allclose(gripper.max(axis=0), np.add(tool, [0, 0.06, 0.04]), atol=1e-9)
@@ -110,7 +110,7 @@ def test_every_robot_is_drawn_whole_and_its_joints_are_named(name, robots, still
     axes = figure.axes[0]
     scene = scene_at(robot, still.posture[None])
     limits = [axes.get_xlim(), axes.get_ylim()] + ([axes.get_zlim()] if axes.name == "3d" else [])
-    points = np.concatenate([faces.reshape(-1, 3) for faces, _, _ in solids_of(robot, scene, 0)])
+    points = np.concatenate([faces.reshape(-1, 3) for faces, *_ in solids_of(robot, scene, 0)])
     points = np.concatenate([points, scene.joints[0], scene.tools[0], scene.com])
     for coordinate, (low, high) in zip(points.T, limits, strict=False):
         assert low < coordinate.min() < coordinate.max() < high
@@ -155,7 +155,7 @@ def test_a_robot_without_shapes_is_its_box_and_capsules(robots):
     solids = solids_of(robot, scene, 0)
     np.testing.assert_array_equal(solids[0][0], scene.base_faces[0])
     ends = scene.segments[0].reshape(-1, 3)
-    for faces, _, _ in solids[1:]:
+    for faces, *_ in solids[1:]:
         # A capsule's middle is the middle of some link's line.
         middle = 0.5 * (faces.reshape(-1, 3).min(axis=0) + faces.reshape(-1, 3).max(axis=0))
         halves = 0.5 * (ends[0::2] + ends[1::2])
