@@ -190,7 +190,8 @@ def test_help_and_catalogue_do_not_import_jax():
         assert "usage: jffsr" in done.stdout
 
 
-def test_robots_lists_sources(capsys):
+def test_robots_lists_sources(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # where the picture goes
     assert cli.main(["robots"]) == cli.MET
     listing = capsys.readouterr().out
     for name in ("hu_2011_planar2", "ye_2019_planar3", "wu_2018_6dof", "servicer_7dof"):
