@@ -97,9 +97,18 @@ def _parser() -> argparse.ArgumentParser:
     robots = commands.add_parser(
         "robots",
         help="the catalogue of robots, with sources",
-        description="List the catalogue, or one robot.",
+        description="List the catalogue; or print one robot in full and draw it.",
     )
     robots.add_argument("robot", metavar="NAME", nargs="?", help="a catalogue name or a robot file")
+    robots.add_argument(
+        "--out", metavar="FILE.png", help="where to draw the robot (default: NAME.png in the current folder)"
+    )
+    robots.add_argument(
+        "--posture",
+        metavar="Q1,Q2,...",
+        help="the joint positions to draw it in, degrees (prismatic: m); write --posture=-30,45 "
+        "where the first is negative (default: zero, or unfolded)",
+    )
     robots.set_defaults(command=_robots)
     return parser
 
@@ -156,7 +165,18 @@ def _show(arguments: argparse.Namespace) -> int:
 def _robots(arguments: argparse.Namespace) -> int:
     from jffsr.study.catalogue import catalogue_text, robot_text
 
-    print(catalogue_text() if arguments.robot is None else robot_text(arguments.robot))
+    if arguments.robot is None:
+        for option in ("out", "posture"):
+            if getattr(arguments, option) is not None:
+                raise InputError(f"--{option} is for one robot: jffsr robots NAME --{option} ...")
+        print(catalogue_text())
+        return MET
+    text = robot_text(arguments.robot)
+    _prepare_jax()
+    from jffsr.viz.still import draw_to_file
+
+    path, posture = draw_to_file(arguments.robot, arguments.out, arguments.posture)
+    print(f"{text}\ndrawn at {posture} in {path}")
     return MET
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import jax
 import numpy as np
 
 from jffsr.crosscheck.drive import EngineMotion, check_x64, make_drive
+from jffsr.crosscheck.fine_motion import check_momentum, check_positive, fine_motion
 from jffsr.crosscheck.mjx_run import run_mjx
 from jffsr.crosscheck.mujoco_run import run_mujoco
 from jffsr.crosscheck.report import ENGINE_TITLES, Comparison, CrosscheckReport, Tolerances
@@ -16,13 +16,8 @@ from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
-from jffsr.rollouts.reference import reference_rollout
 from jffsr.rollouts.rollout import check_duration
 from jffsr.trajectories.interface import Trajectory
-
-_SAMPLES = 100
-# The reference's Runge-Kutta step, s, is short beside any motion whose torques a 2 ms step can follow.
-_REFERENCE_STEP = 0.01
 
 
 def crosscheck(
@@ -57,10 +52,10 @@ def crosscheck(
             )
         duration = float(reference.time[-1])
         momentum = reference.momentum if momentum is None else momentum
-    duration = _check_positive("duration", float(check_duration(trajectory, duration)))
-    momentum = _check_momentum(momentum)
+    duration = check_positive("duration", float(check_duration(trajectory, duration)))
+    momentum = check_momentum(momentum)
     if reference is None:
-        reference = _fine_motion(robot, trajectory, initial_state, duration, momentum)
+        reference = fine_motion(robot, trajectory, initial_state, duration, momentum)
 
     sample_time = np.asarray(reference.time, dtype=float)
     drives = [make_drive(robot, trajectory, initial_state, sample_time, step, momentum) for step in steps]
@@ -115,31 +110,6 @@ def _compare(
     )
 
 
-def _fine_motion(
-    robot: Robot, trajectory: Trajectory, initial_state: State, duration: float, momentum: np.ndarray
-) -> Motion:
-    per_sample = max(1, int(np.ceil(duration / _SAMPLES / _REFERENCE_STEP)))
-    # Compiled as a whole: operation by operation, JAX would compile every one of them.
-    motion = jax.jit(
-        lambda robot, start, momentum: reference_rollout(
-            robot, trajectory, start, duration, _SAMPLES * per_sample, momentum
-        )
-    )(robot, initial_state, momentum)
-    samples = {
-        name: getattr(motion, name)[::per_sample]
-        for name in (
-            "time",
-            "base_position",
-            "base_quaternion",
-            "base_twist",
-            "joint_position",
-            "joint_velocity",
-            "joint_acceleration",
-        )
-    }
-    return Motion(momentum=motion.momentum, joint_grid=motion.joint_grid, **samples)
-
-
 def _check_engines(engines: Sequence[str]) -> tuple[str, ...]:
     names = (engines,) if isinstance(engines, str) else tuple(dict.fromkeys(engines))
     for name in names:
@@ -153,19 +123,4 @@ def _check_engines(engines: Sequence[str]) -> tuple[str, ...]:
 def _check_steps(steps: Sequence[float]) -> list[float]:
     if not len(steps):
         raise InputError("no step length was given; at least one, in seconds, is needed")
-    return sorted({_check_positive("a step", float(step)) for step in steps}, reverse=True)
-
-
-def _check_positive(what: str, seconds: float) -> float:
-    if not (np.isfinite(seconds) and seconds > 0):
-        raise InputError(f"{what} is {seconds:g} s; it must be positive and finite")
-    return seconds
-
-
-def _check_momentum(momentum: Sequence[float] | jax.Array | None) -> np.ndarray:
-    values = np.zeros(6) if momentum is None else np.asarray(momentum, dtype=float)
-    if values.shape != (6,) or not np.all(np.isfinite(values)):
-        raise InputError(
-            f"momentum is {values.tolist()}; six finite numbers are expected, P in N s, then L in N m s"
-        )
-    return values
+    return sorted({check_positive("a step", float(step)) for step in steps}, reverse=True)

@@ -97,9 +97,6 @@ def make_drive(
     position = np.array(initial_state.base_position, dtype=float)
     quaternion = np.array(initial_state.base_quaternion, dtype=float)
     start = State(base_position=position, base_quaternion=quaternion, joint_position=q[0])
-    twist = np.asarray(_initial_twist(robot, start, qd[0], momentum))
-    # A free joint's linear velocity is resolved in I, its angular velocity in B.
-    spin_B = np.asarray(quaternion_to_matrix(jnp.asarray(quaternion))).T @ twist[3:]
     return Drive(
         step=step,
         substeps=substeps,
@@ -108,8 +105,18 @@ def make_drive(
         joint_velocity=qd,
         mean_acceleration=np.diff(qd, axis=0) / step,
         qpos=np.concatenate([position, quaternion, q[0]]),
-        qvel=np.concatenate([twist[:3], spin_B, qd[0]]),
+        qvel=initial_velocity(robot, start, qd[0], momentum),
     )
+
+
+def initial_velocity(
+    robot: Robot, start: State, joint_velocity: np.ndarray, momentum: np.ndarray
+) -> np.ndarray:
+    """Velocity (6 + n,) as MuJoCo orders it, of a robot that starts with this momentum (6,)."""
+    twist = np.asarray(_initial_twist(robot, start, joint_velocity, momentum))
+    # A free joint's linear velocity is resolved in I, its angular velocity in B.
+    spin_B = np.asarray(quaternion_to_matrix(jnp.asarray(start.base_quaternion))).T @ twist[3:]
+    return np.concatenate([twist[:3], spin_B, joint_velocity])
 
 
 @jax.jit

@@ -61,6 +61,7 @@ def _solve(config: PlanningConfig, problem: Problem, **hooks: Any) -> Plan:
         step_factor=config.verification.step_factor,
         tolerances=build_tolerances(config),
         precision=config.precision,
+        with_sensitivity=config.verification.sensitivity,
         **hooks,
     )
 

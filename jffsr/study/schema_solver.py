@@ -72,6 +72,7 @@ class Verification(Section):
     limit_tolerance: Positive = 1e-3
     attitude_tolerance: Positive = 1e-6
     momentum_tolerance: Positive = 1e-6
+    sensitivity: Flag = True  # derivatives of the plan by every mass and inertia
 
 
 class Output(Section):

@@ -10,6 +10,7 @@ import numpy as np
 
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import violations
+from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
 _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
 
@@ -57,6 +58,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
                 for kind in ("position", "rate", "acceleration", "excursion")
             },
         },
+        "sensitivity": None if plan.sensitivity is None else sensitivity_summary(plan.sensitivity),
     }
 
 
@@ -88,6 +90,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"position {_number(check['position_difference_m'])} m, "
         f"momentum drift {_number(check['momentum_drift_relative'])}"
     )
+    lines += sensitivity_lines(summary.get("sensitivity"))
     crosscheck = check.get("mujoco")
     if crosscheck:
         lines.append(f"  simulators    {crosscheck['sentence']}")

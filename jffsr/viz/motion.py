@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from jffsr.robots.robot import Robot
 from jffsr.viz.scene import Scene, scene_of
 from jffsr.viz.style import COLOURS, WIDTH, legend_above, new_figure, styled
+from jffsr.viz.view import fill, frame_plane, frame_space, viewpoint
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
 _LIGHT, _DARK = np.array([0.72, 0.82, 0.92]), np.array([0.02, 0.10, 0.25])
-_ELEVATION = 20.0  # deg
 _TALLEST = 3.6  # in
 _PATH = {"color": COLOURS[2], "linewidth": 0.9, "linestyle": (0, (3, 1))}
 
@@ -43,12 +41,13 @@ def draw_robot(robot: Robot, dataset: Dataset, instants: int = 5) -> Figure:
         height = float(np.clip((WIDTH - 0.6) * (high - low)[1] / (high - low)[0], 0.9, 3.4)) + 0.75
         figure = new_figure(height)
         axes = figure.subplots()
-        _frame_plane(axes, low, high)
+        frame_plane(axes, low, high)
     else:
         size = 3
         figure = new_figure(WIDTH)
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
-        towards = _frame_space(axes, low, high, _viewpoint(scene, chosen))
+        azimuth = viewpoint(scene.segments[chosen], scene.base_position[0])
+        towards = frame_space(axes, low, high, azimuth)
     for order, (sample, colour) in enumerate(zip(chosen, colours, strict=True)):
         last = order == len(chosen) - 1
         # In space the bases between would only be a tangle of lines.
@@ -63,7 +62,7 @@ def draw_robot(robot: Robot, dataset: Dataset, instants: int = 5) -> Figure:
     times = [f"{scene.time[sample]:.3g}" for sample in chosen]
     legend = legend_above(figure, handles, [*times[:-1], f"{times[-1]} s", "tool path"], handlelength=1.5)
     if size == 3:
-        _fill(figure, axes, legend)
+        fill(figure, axes, legend, _TALLEST)
     return figure
 
 
@@ -122,69 +121,3 @@ def _draw_base_axes(axes, scene: Scene, order: int, size: int) -> None:
             va="center",
             zorder=order,
         )
-
-
-def _frame_plane(axes, low: np.ndarray, high: np.ndarray) -> None:
-    axes.set_aspect("equal")
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="x [m]", ylabel="y [m]")
-
-
-def _frame_space(axes, low: np.ndarray, high: np.ndarray, azimuth: float) -> np.ndarray:
-    """Frame a view in three dimensions; the direction (3,) towards the reader."""
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low)
-    axes.set_proj_type("ortho")
-    axes.view_init(elev=_ELEVATION, azim=azimuth)
-    longest = (high - low).max()
-    for name, axis, span in zip("xyz", (axes.xaxis, axes.yaxis, axes.zaxis), high - low, strict=True):
-        axis.set_major_locator(MaxNLocator(max(1, round(4 * span / longest)), steps=[1, 2, 5, 10]))
-        axis.set_pane_color((1, 1, 1, 0))
-        axis.set_tick_params(pad=-3)
-        axis.set_label_text(f"{name} [m]")
-        axis.labelpad = -8
-        axis._axinfo["grid"].update(color="0.9", linewidth=0.4)
-    return _towards(azimuth)
-
-
-def _fill(figure: Figure, axes, legend: Legend) -> None:
-    """Scale and move a view in three dimensions so that it fills the figure under its legend."""
-    figure.set_layout_engine("none")
-    head = legend.get_window_extent().height / figure.dpi
-    place = np.array([0.5 * WIDTH, 0.5 * WIDTH])  # centre of the square that holds the view, in
-    side, total = 0.8 * WIDTH, WIDTH
-    # Words do not grow with the view, hence more than one round.
-    for _ in range(3):
-        figure.set_size_inches(WIDTH, total)
-        left, bottom = place - 0.5 * side
-        axes.set_position((left / WIDTH, bottom / total, side / WIDTH, side / total))
-        box = axes.get_tightbbox(figure.canvas.get_renderer())
-        middle = np.array([box.x0 + box.x1, box.y0 + box.y1]) / (2 * figure.dpi) - place
-        width, height = box.width / figure.dpi, box.height / figure.dpi
-        scale = min((WIDTH - 0.1) / width, _TALLEST / height)
-        side, total = scale * side, scale * height + head + 0.15
-        place = np.array([0.5 * WIDTH, 0.05 + 0.5 * scale * height]) - scale * middle
-    figure.set_size_inches(WIDTH, total)
-    left, bottom = place - 0.5 * side
-    axes.set_position((left / WIDTH, bottom / total, side / WIDTH, side / total))
-
-
-def _towards(azimuth: float) -> np.ndarray:
-    e, a = np.deg2rad(_ELEVATION), np.deg2rad(azimuth)
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-
-
-def _viewpoint(scene: Scene, chosen: np.ndarray) -> float:
-    """Azimuth, deg, from where the arm's places cover most of the picture, before the base and not behind."""
-    arm = scene.segments[chosen].reshape(-1, 3) - scene.base_position[0]
-    spread = arm - arm.mean(axis=0)
-    reach = np.linalg.norm(arm.mean(axis=0)) + 1e-9
-
-    def merit(azimuth: float) -> float:
-        towards = _towards(azimuth)
-        right = np.cross([0.0, 0.0, 1.0], towards) / np.cos(np.deg2rad(_ELEVATION))
-        across = spread @ np.stack([right, np.cross(towards, right)], axis=1)
-        area = np.prod(np.linalg.svd(across, compute_uv=False))
-        return float(area * (1.5 + arm.mean(axis=0) @ towards / reach))
-
-    # Never along an axis, which would put the words of two axes on each other.
-    return max((quarter + turn for quarter in (-180, -90, 0, 90) for turn in (30, 45, 60)), key=merit)

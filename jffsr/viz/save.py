@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
+from PIL import Image
 
+from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.viz.base import draw_base
 from jffsr.viz.convergence import draw_convergence
@@ -17,6 +22,8 @@ from jffsr.viz.style import styled
 
 if TYPE_CHECKING:
     from xarray import Dataset
+
+_PICTURE_DPI = 160
 
 
 def save_figures(robot: Robot, dataset: Dataset, folder: str | Path) -> list[Path]:
@@ -39,14 +46,36 @@ def save_figures(robot: Robot, dataset: Dataset, folder: str | Path) -> list[Pat
 def save_figure(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure to `stem`.png and `stem`.pdf, each beside its place and then moved; their paths."""
     paths = []
+    # Without a date the same run gives the same bytes.
     for kind, metadata in (("png", {"Software": None}), ("pdf", {"CreationDate": None})):
         path = stem.with_name(f"{stem.name}.{kind}")
-        unfinished = stem.with_name(f".{stem.name}.{kind}.{os.getpid()}")
-        try:
-            # Without a date the same run gives the same bytes.
-            figure.savefig(unfinished, format=kind, metadata=metadata)
-            os.replace(unfinished, path)
-        finally:
-            unfinished.unlink(missing_ok=True)
+        _whole(path, partial(figure.savefig, format=kind, metadata=metadata))
         paths.append(path)
     return paths
+
+
+@styled
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure to one small .png of at most 256 colours; InputError where that cannot be written."""
+    if path.suffix.lower() != ".png":
+        raise InputError(f"'{path}': a picture is written as .png, found the ending '{path.suffix}'")
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=_PICTURE_DPI)
+    # Maximum coverage keeps the few letters and thin lines of a colour apart from the large faces.
+    picture = Image.open(buffer).convert("RGB")
+    picture = picture.quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+    try:
+        _whole(path, partial(picture.save, format="png", optimize=True))
+    except OSError as error:
+        raise InputError(
+            f"'{path}': the picture cannot be written there ({error.strerror or error}); name another place"
+        ) from None
+
+
+def _whole(path: Path, write: Callable[[Path], None]) -> None:
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        write(unfinished)
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)

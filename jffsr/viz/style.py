@@ -81,9 +81,9 @@ def styled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return inside
 
 
-def new_figure(height: float) -> Figure:
-    """An empty figure of column width and `height` in inches, with a canvas of its own and no window."""
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure of `width` and `height` in inches, with a canvas of its own and no window."""
+    figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

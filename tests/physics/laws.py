@@ -117,18 +117,24 @@ def _in_mujoco(robot: Robot, state: State, torque: np.ndarray) -> dict[str, np.n
     model = to_mjmodel(robot, 1e-3)
     data = mujoco.MjData(model)
     rotation = np.asarray(quaternion_to_matrix(state.base_quaternion))
+    # MuJoCo numbers joints and motors along the branches of the tree, whatever order they were made in.
+    names = robot.joint_names
+    dofs = np.array([model.joint(name).dofadr[0] for name in names])
+    motors = np.array([model.actuator(name).id for name in names])
     # A free joint's linear velocity is resolved in I, its angular velocity in B.
-    data.qpos[:] = np.concatenate([state.base_position, state.base_quaternion, state.joint_position])
-    spin = rotation.T @ state.base_twist[3:]
-    data.qvel[:] = np.concatenate([state.base_twist[:3], spin, state.joint_velocity])
-    data.ctrl[:] = torque
+    data.qpos[:7] = np.concatenate([state.base_position, state.base_quaternion])
+    data.qpos[dofs + 1] = state.joint_position
+    data.qvel[:6] = np.concatenate([state.base_twist[:3], rotation.T @ state.base_twist[3:]])
+    data.qvel[dofs] = state.joint_velocity
+    data.ctrl[motors] = torque
     mujoco.mj_forward(model, data)
     mujoco.mj_subtreeVel(model, data)
     mujoco.mj_energyVel(model, data)
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
-    turn = np.eye(model.nv)
-    turn[3:6, 3:6] = rotation
+    turn = np.zeros((model.nv, model.nv))
+    turn[:3, :3], turn[3:6, 3:6] = np.eye(3), rotation
+    turn[6 + np.arange(len(names)), dofs] = 1.0
     linear = model.body_subtreemass[1] * data.subtree_linvel[1]
     return {
         "inertia": turn @ inertia @ turn.T,

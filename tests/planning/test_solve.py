@@ -17,6 +17,7 @@ from jffsr.optimizers.registry import Settings
 from jffsr.planning import plan as plan_module
 from jffsr.planning.plan import SearchInterrupted, solve
 from jffsr.planning.result import ResultCode, Tolerances, explain, result_code
+from jffsr.planning.sensitivity import sensitivity
 from jffsr.rollouts.conservation import momentum_drift
 from jffsr.rollouts.rollout import rollout
 
@@ -71,6 +72,15 @@ def test_plan_is_consistent(problem, plan):
         ResultCode.LIMITS_VIOLATED,
     )
     assert plan.seconds["total"] >= plan.seconds["run"] >= 0
+
+
+def test_sensitivity_is_that_of_the_chosen_free_numbers(problem, plan):
+    assert plan.sensitivity.bodies == problem.robot.body_names
+    expected = sensitivity(problem, plan.free)
+    np.testing.assert_array_equal(plan.sensitivity.derivative.tool.inertia, expected.derivative.tool.inertia)
+    sizes = [row.tool for row in plan.sensitivity.per_percent]
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] > 0
 
 
 def test_history_and_counts(plan):

@@ -28,6 +28,25 @@ def test_every_robot_loads_and_cites_its_source(name):
 
 
 @pytest.mark.parametrize("name", list_robots())
+def test_every_body_is_well_inside_what_is_physical(name):
+    """Rounding, or a change of units, must not be able to carry a body over the edge."""
+    for body, inertia in zip(load_robot(name).body_names, load_robot(name).inertia, strict=True):
+        low, middle, high = np.linalg.eigvalsh(inertia)
+        assert low > 1e-7, body
+        assert low + middle > 1.002 * high, body
+
+
+@pytest.mark.parametrize("name", list_robots())
+def test_every_body_has_shapes_of_a_sensible_size(name):
+    robot = load_robot(name)
+    for body in robot.body_names:
+        shapes = robot.geometry.on_body(body)
+        assert shapes, body
+        assert all(1e-3 < value < 20 for shape in shapes for value in shape.size)
+        assert all(max(abs(shape.position)) < 20 for shape in shapes)
+
+
+@pytest.mark.parametrize("name", list_robots())
 def test_aliases_name_the_same_robot(name):
     for alias in describe_robot(name).aliases:
         assert load_robot(alias).name == name
@@ -38,8 +57,9 @@ def test_no_name_is_taken_twice():
     assert len(names) == len(set(names))
 
 
-def test_the_papers_robots_are_there():
-    assert {"wu_2018_6dof", "hu_2011_planar2", "ye_2019_planar3", "servicer_7dof"} <= set(list_robots())
+def test_the_papers_robots_and_the_flown_ones_are_there():
+    papers = {"wu_2018_6dof", "hu_2011_planar2", "ye_2019_planar3", "servicer_7dof", "li_2022_7dof"}
+    assert papers | {"ets7_6dof", "canadarm2_7dof", "astrobee_2dof", "vispa_6dof"} <= set(list_robots())
     assert list(list_robots()) == sorted(list_robots())
 
 

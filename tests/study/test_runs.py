@@ -15,6 +15,7 @@ import pytest
 from jffsr import cli
 from jffsr.study import planning
 from jffsr.study.dataset import open_dataset
+from jffsr.study.summary import summary_text
 
 CONFIG = "configs/planning/composite_wu6.yaml"
 
@@ -53,6 +54,10 @@ def test_folder_holds_what_is_promised(finished):
     assert summary["evaluations"]["objective"] == 16
     assert 1 <= summary["evaluations"]["gradient"] <= 6
     assert {"attitude_difference_rad", "momentum_drift_relative"} <= set(summary["verification"])
+    sensitivity = summary["sensitivity"]
+    assert set(sensitivity["bodies"]) == {row["body"] for row in sensitivity["per_percent"]}
+    assert len(sensitivity["per_percent"]) == 2 * 7
+    assert sensitivity["per_percent"][0]["sentence"] in summary_text(summary)
     assert summary["versions"]["jax"]
     lines = [json.loads(line) for line in (finished / "metrics.jsonl").read_text().splitlines()]
     assert lines[0]["phase"] == "swarm"
@@ -165,6 +170,7 @@ def test_impossible_is_refused_before_any_search(small, tmp_path, capsys):
 
 def test_float32_is_searched_and_verified_in_float64(small, tmp_path):
     swarm = [*small, "precision=float32", "optimizer.kind=qpso", "optimizer.evaluations=16"]
+    swarm.append("verification.sensitivity=false")
     code = (
         "import sys; from jffsr.cli import main; "
         f"sys.exit(main(['run', {CONFIG!r}, *{swarm!r}, '--out', {str(tmp_path / 'f')!r}]))"
@@ -174,6 +180,7 @@ def test_float32_is_searched_and_verified_in_float64(small, tmp_path):
     summary = json.loads((tmp_path / "f/summary.json").read_text())
     # In float32 the ends would be missed by some 1e-6.
     assert summary["verification"]["boundary_error"] < 1e-10
+    assert summary["sensitivity"] is None
 
 
 def test_help_and_catalogue_do_not_import_jax():
@@ -190,7 +197,8 @@ def test_help_and_catalogue_do_not_import_jax():
         assert "usage: jffsr" in done.stdout
 
 
-def test_robots_lists_sources(capsys):
+def test_robots_lists_sources(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # where the picture goes
     assert cli.main(["robots"]) == cli.MET
     listing = capsys.readouterr().out
     for name in ("hu_2011_planar2", "ye_2019_planar3", "wu_2018_6dof", "servicer_7dof"):
