@@ -100,7 +100,8 @@ class _Reader:
             if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
                 raise InputError(
                     f"{self._place(base)}: joint '{self.joints[joint]}' hinges it on the world: the robot has no base "
-                    "body; put it on a base with jffsr.attach, or let the top body have no joint or a free one"
+                    "body; put a body with mass and inertia, its base, between the two (jffsr.attach(..., "
+                    "arm_base='drop') then puts the arm on any other)"
                 )
         return base
 

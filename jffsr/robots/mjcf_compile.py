@@ -27,6 +27,8 @@ def compile_mjcf(prepared: Prepared, shown: str, folder: Path) -> tuple[Any, Any
             _check_joints(spec, shown)
             prepared.notes += give_meshes(spec, shown, folder)
             model = spec.compile()
+        except InputError:
+            raise
         except (ValueError, TypeError, mujoco.FatalError) as error:
             raise InputError(_sentence(str(error), prepared, shown)) from None
     prepared.notes += [f"MuJoCo says: {' '.join(str(warning.message).split())}" for warning in said]
@@ -38,11 +40,14 @@ def _sentence(message: str, prepared: Prepared, shown: str) -> str:
     words = " ".join(message.split()).rstrip(". ")
     line = re.search(r",? ?line (\d+)$", words)
     place = prepared.blame(int(line.group(1)), shown) if line else shown
-    words = re.sub(r"^(XML )?Error: ", "", words[: line.start()] if line else words)
+    words = re.sub(r"^(XML )?(Error: )+", "", words[: line.start()] if line else words)
     words = re.sub(r",? ?(Element name '.*?', id \d+|Object name = .*)$", "", words).strip()
     words = re.sub(r"^(.*?),? ?Element '(\w+)'$", r"<\2>: \1", words)
     if "mjMINVAL" in words:
-        return f"{place}: it moves and has no inertia, nor has any body fixed to it; a mass and an inertia are needed"
+        return (
+            f"{place}: it moves and has no inertia, or a mass or moment that is not positive, nor has any body fixed "
+            "to it; a mass and an inertia are needed"
+        )
     return f"{place}: MuJoCo does not accept it: {words}"
 
 

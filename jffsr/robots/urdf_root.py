@@ -39,7 +39,7 @@ def settle_root(links: Links, joints: Joints, shown: str) -> tuple[Links, Joints
             moved = f" and joint '{hinge}' moves what hangs from it" if hinge else ""
             raise InputError(
                 f"{shown}: root link '{root}' has no mass{moved}: the robot has no base body; "
-                "give the root an inertial, or put the robot on a base with jffsr.attach"
+                "give the root an inertial; jffsr.attach(..., arm_base='drop') then puts the arm on any other base"
             )
         if floating and len(below) > 1:
             raise InputError(

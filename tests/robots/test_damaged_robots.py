@@ -162,6 +162,8 @@ def test_a_damaged_file_is_refused_with_file_body_and_reason(folder, suffix, goo
     path = folder / f"damaged.{suffix}"
     path.write_text(text.replace(good, bad, 1), encoding="utf-8")
     message = refusal(path)
+    assert message.count("MuJoCo does not accept it") <= 1
+    assert message.count(path.name) == 1 or "<include>" in message
     at = 0
     for word in [f"damaged.{suffix}", *words]:
         assert word in message[at:], f"{word!r} is not in, or not in this order: {message}"
@@ -355,9 +357,9 @@ def test_a_thousand_mutations_end_well(folder, share):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", range(5))
-def test_twenty_thousand_mutations_end_well(folder, share):
-    ended = check_mutations(folder, range(1000 + share, 21_000, 5))
-    assert ended["as it says"] >= 600
+def test_ten_thousand_more_mutations_end_well(folder, share):
+    ended = check_mutations(folder, range(1000 + share, 11_000, 5))
+    assert ended["as it says"] >= 300
 
 
 TAG = re.compile(r"<(/?)(\w+)([^<>]*?)(/?)>")

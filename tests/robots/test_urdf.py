@@ -268,6 +268,16 @@ def test_a_urdf_may_be_an_arm_of_a_robot_file(satellite):
     np.testing.assert_array_equal(robot.mass, [300, *arm.mass[1:], *arm.mass[1:]])
 
 
+def test_mesh_names_with_backslashes(satellite):
+    text = URDF.replace(
+        "satellite_description/meshes/shoulder.stl", r"satellite_description\meshes\shoulder.stl"
+    )
+    satellite.write_text(text, encoding="utf-8")
+    assert [shape.name for shape in load_robot(satellite).geometry.on_body("shoulder")] == [
+        "shoulder_visual_0"
+    ]
+
+
 def test_files_of_another_type_are_refused(tmp_path):
     for name in ("arm.sdf", "arm.urdf.xacro", "arm"):
         (tmp_path / name).write_text("<sdf/>")
