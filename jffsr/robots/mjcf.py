@@ -54,8 +54,6 @@ class _Reader:
     def description(self) -> RobotDescription:
         """All of it."""
         model = self.model
-        if model.nbody == 1:
-            raise InputError(f"{self.shown}: there is no body in <worldbody>")
         moving = range(1, model.nbody)
         links = [self._link(body) for body in moving]
         joints = [self._joint(body) for body in moving if body != self.base]

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 from jffsr.errors import InputError
 from jffsr.reading.files import read_text
 from jffsr.reading.xml_tree import Node, parse_xml
-from jffsr.robots.xml_values import NUMBER
+from jffsr.robots.xml_values import MOST_BODIES, NUMBER
 
 _MOST_INCLUDES = 100
 _MOST_ELEMENTS = 100_000
@@ -80,7 +80,7 @@ class Prepared:
 
 def prepare(root: Node, shown: str, folder: Path) -> Prepared:
     """The text that MuJoCo is to read; InputError where something in it is not supported."""
-    _include(root, folder, [shown], [0])
+    _include(root, folder, [shown], [0, 0])
     prepared = Prepared()
     _read_custom(root, prepared)
     _refuse(root)
@@ -126,7 +126,10 @@ def _include(node: Node, folder: Path, stack: list[str], count: list[int]) -> No
             )
             raise InputError(f"{child.place}: <include> {name!r}: {why if name else 'no file is named'}")
         try:
-            content = parse_xml(read_text(folder / name, name, "MJCF", _MOST_BYTES), name)
+            # What all included files hold together is limited, or a small fan of them would take hours.
+            text = read_text(folder / name, name, "MJCF", _MOST_BYTES - count[1])
+            count[1] += len(text)
+            content = parse_xml(text, name)
         except InputError as error:
             raise InputError(f"{child.place}: <include>: {error}") from None
         _include(content, folder, [*stack, name], count)
@@ -155,6 +158,7 @@ def _refuse(root: Node) -> None:
                 raise InputError(
                     f"{node.place}: " + _REFUSED_SECTIONS[section.tag].format(tag=node.tag, name=name)
                 )
+    bodies = 0
     for count, node in enumerate(root.walk()):
         if count > _MOST_ELEMENTS:
             raise InputError(f"{root.file}: there are more than {_MOST_ELEMENTS:,} elements")
@@ -177,6 +181,9 @@ def _refuse(root: Node) -> None:
                     raise InputError(
                         f"{place_of(node)}: <{node.tag}> {attribute} '{node.get(attribute)}' is not finite"
                     )
+        bodies += node.tag == "body"
+        if bodies > MOST_BODIES:
+            raise InputError(f"{root.file}: there are more than {MOST_BODIES} bodies")
         if node.tag == "inertial":
             mass = node.get("mass").strip()
             # MuJoCo reads a negative mass as zero.

@@ -22,6 +22,7 @@ from jffsr.robots.rpy import rpy_to_matrix
 from jffsr.robots.urdf_root import FLOATING, settle_root
 from jffsr.robots.urdf_shapes import read_shapes
 from jffsr.robots.xml_values import (
+    MOST_BODIES,
     at_most_one,
     bound,
     foreign,
@@ -66,8 +67,9 @@ def describe_urdf(root: Node, shown: str, folder: Path) -> RobotDescription:
     notes = [f"elements <{tag}> are passed over" for tag in sorted(left_out)]
     links = [_link(node, notes) for node in root.all("link")]
     joints = [_joint(node, notes) for node in root.all("joint")]
-    if not links:
-        raise InputError(f"{shown}: the robot has no link")
+    if not 0 < len(links) <= MOST_BODIES or len(joints) > MOST_BODIES:
+        said = f"more than {MOST_BODIES} links or joints" if links else "no link"
+        raise InputError(f"{shown}: the robot has {said}")
     shapes, missing = read_shapes(root.all("link"), folder)
     links, joints, skipped = settle_root(links, joints, shown)
     here = {link.name for link in links}

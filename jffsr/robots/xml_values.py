@@ -16,6 +16,9 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(inf|infinity|n
 LARGEST = 1e30
 """No length, mass or moment is larger: its square must still be a number."""
 
+MOST_BODIES = 1000
+"""No robot has more links or bodies."""
+
 _COUNTS = {1: "a number", 3: "three numbers", 4: "four numbers"}
 
 

@@ -233,6 +233,12 @@ HOSTILE = {
     "no body": ("<mujoco/>", "there is no body in <worldbody>"),
     "one body": ('<mujoco><worldbody><body name="a"><geom size="1"/></body></worldbody></mujoco>', "no revolute or"),
     "something else": ("<html><body/></html>", ":1: the first element is <html>; <robot> (URDF) or <mujoco> (MJCF)"),
+    "links without end": ("<robot>" + '<link name="a"/>' * 50_000 + "</robot>", "more than 1000 links or joints"),
+    "bodies without end": (
+        "<mujoco><worldbody>" + "<body/>" * 50_000 + "</worldbody></mujoco>",
+        "there are more than 1000 bodies",
+    ),
+    "elements without end": ("<mujoco>" + "<a/>" * 200_000 + "</mujoco>", "there are more than 100,000 elements"),
     "an include that bites its tail": ('<mujoco>\n<include file="hostile.xml"/></mujoco>', "a file includes itself"),
 }  # fmt: skip
 
@@ -246,6 +252,17 @@ def test_a_hostile_file_is_refused_soon(folder, case):
     assert message.startswith("hostile.xml")
     assert words in message
     assert len(message) < 400
+
+
+def test_a_fan_of_included_files_is_refused_soon(folder):
+    """Each file includes the next ten times: ten thousand million files, if somebody let it."""
+    for level in range(10):
+        inside = f'<include file="{level + 1}.xml"/>' * 10
+        (folder / f"{level}.xml").write_text(f"<mujoco>{inside}</mujoco>")
+    (folder / "10.xml").write_text("<mujoco/>")
+    assert "at most 100 files can be included" in refusal("0.xml")
+    (folder / "1.xml").write_text(f"<mujoco>{' ' * 2_000_000}</mujoco>")
+    assert "1.xml: the file is larger than" in refusal("0.xml")
 
 
 def test_what_is_no_text_file_is_refused(folder):
