@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jffsr.crosscheck.mujoco_model import BASE_VELOCITIES
+from jffsr.crosscheck.mujoco_model import BASE_VELOCITIES, branch_order
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.dynamics.momentum import base_twist
 from jffsr.errors import InputError
@@ -34,7 +34,7 @@ class Drive:
 
     step, s; time (K + 1,), s, of the samples; joint_position and joint_velocity (K substeps + 1, n) at the
     step boundaries; mean_acceleration (K substeps, n) over each step; qpos (7 + n,) and qvel (6 + n,), the
-    initial state as MuJoCo orders it.
+    initial state. All joints are in MuJoCo's order; order (n,) is the robot's joint at each of its places.
     """
 
     step: float
@@ -45,6 +45,11 @@ class Drive:
     mean_acceleration: np.ndarray
     qpos: np.ndarray
     qvel: np.ndarray
+    order: np.ndarray
+
+    def robot_order(self, joints: np.ndarray) -> np.ndarray:
+        """Joint values (..., n) brought from MuJoCo's order into the robot's."""
+        return joints[..., np.argsort(self.order)]
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,9 @@ def make_drive(
     position = np.array(initial_state.base_position, dtype=float)
     quaternion = np.array(initial_state.base_quaternion, dtype=float)
     start = State(base_position=position, base_quaternion=quaternion, joint_position=q[0])
+    velocity = initial_velocity(robot, start, qd[0], momentum)
+    order = branch_order(robot.topology)
+    q, qd = q[:, order], qd[:, order]
     return Drive(
         step=step,
         substeps=substeps,
@@ -105,7 +113,8 @@ def make_drive(
         joint_velocity=qd,
         mean_acceleration=np.diff(qd, axis=0) / step,
         qpos=np.concatenate([position, quaternion, q[0]]),
-        qvel=initial_velocity(robot, start, qd[0], momentum),
+        qvel=velocity,
+        order=order,
     )
 
 
@@ -116,7 +125,7 @@ def initial_velocity(
     twist = np.asarray(_initial_twist(robot, start, joint_velocity, momentum))
     # A free joint's linear velocity is resolved in I, its angular velocity in B.
     spin_B = np.asarray(quaternion_to_matrix(jnp.asarray(start.base_quaternion))).T @ twist[3:]
-    return np.concatenate([twist[:3], spin_B, joint_velocity])
+    return np.concatenate([twist[:3], spin_B, joint_velocity[branch_order(robot.topology)]])
 
 
 @jax.jit

@@ -71,8 +71,9 @@ def crosscheck_many(
 
     sample_time = np.asarray(reference.time[0], dtype=float)
     drive = make_drive(singles[0], trajectory, initial_state, sample_time, step, momentum)
-    start = State(drive.qpos[:3], drive.qpos[3:BASE_COORDINATES], drive.joint_position[0])
-    rates = np.array([initial_velocity(robot, start, drive.joint_velocity[0], momentum) for robot in singles])
+    posture, speed = drive.robot_order(drive.joint_position[0]), drive.robot_order(drive.joint_velocity[0])
+    start = State(drive.qpos[:3], drive.qpos[3:BASE_COORDINATES], posture)
+    rates = np.array([initial_velocity(robot, start, speed, momentum) for robot in singles])
     poses, tracking, compile_seconds, run_seconds = _run(singles, drive, rates)
     attitude = attitude_difference(np.asarray(reference.base_quaternion), poses[..., 3:BASE_COORDINATES])
     distance = np.linalg.norm(poses[..., :3] - np.asarray(reference.base_position), axis=-1)

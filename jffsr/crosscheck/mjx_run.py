@@ -60,7 +60,7 @@ def run_mjx(robot: Robot, drives: Sequence[Drive]) -> list[EngineMotion]:
                     time=drive.time,
                     base_position=qpos[:, :3],
                     base_quaternion=qpos[:, 3:BASE_COORDINATES],
-                    joint_position=qpos[:, BASE_COORDINATES:],
+                    joint_position=drive.robot_order(qpos[:, BASE_COORDINATES:]),
                     momentum=np.concatenate([linear.sum(axis=1), angular.sum(axis=1)], axis=-1),
                     momentum_share=largest_shares(linear, angular),
                     tracking_error=float(np.maximum(error, np.abs(drive.joint_position[-1] - last).max())),

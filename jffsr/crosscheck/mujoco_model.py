@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.robots.robot import REVOLUTE, Robot
+from jffsr.robots.robot import REVOLUTE, Robot, Topology
 
 if TYPE_CHECKING:
     import mujoco
@@ -25,11 +25,12 @@ _DISABLED = (
 
 
 def to_mjspec(robot: Robot) -> mujoco.MjSpec:
-    """MuJoCo specification of a robot: body 1 is the base, bodies, joints and motors in the robot's order.
+    """MuJoCo specification of a robot: body 1 is the base, bodies, joints and motors in `branch_order`.
 
     Body frames are ours, so the free joint carries the base's centre of mass and MuJoCo's joint coordinates
-    equal ours. Gravity, contacts, damping, armature and limits are absent; each joint has a motor of gear
-    one, which is the only thing that can act; end effectors are sites. The integrator is RK4.
+    equal ours, but for their order. Gravity, contacts, damping, armature and limits are absent; each joint
+    has a motor of gear one, which is the only thing that can act; end effectors are sites. The integrator is
+    RK4.
     """
     import mujoco
 
@@ -62,6 +63,7 @@ def to_mjspec(robot: Robot) -> mujoco.MjSpec:
         )
         _set_inertia(body, robot, i + 1)
         bodies.append(body)
+    for i in branch_order(topology):
         motor = spec.add_actuator(name=topology.joint_names[i], target=topology.joint_names[i])
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
         motor.set_to_motor()
@@ -72,6 +74,20 @@ def to_mjspec(robot: Robot) -> mujoco.MjSpec:
             quat=_quaternion(robot.end_effector_rotation[k]),
         )
     return spec
+
+
+def branch_order(topology: Topology) -> np.ndarray:
+    """Our joint (n,) at each of MuJoCo's coordinates, which run along a branch to its end before the next."""
+    order: list[int] = []
+
+    def follow(body: int) -> None:
+        for joint, parent in enumerate(topology.parents):
+            if parent == body:
+                order.append(joint)
+                follow(joint + 1)
+
+    follow(0)
+    return np.array(order, dtype=int)
 
 
 def to_mjmodel(robot: Robot, step: float) -> mujoco.MjModel:

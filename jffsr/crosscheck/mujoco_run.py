@@ -65,7 +65,7 @@ def run_mujoco(robot: Robot, drive: Drive) -> EngineMotion:
         time=drive.time,
         base_position=poses[:, :3],
         base_quaternion=poses[:, 3:BASE_COORDINATES],
-        joint_position=poses[:, BASE_COORDINATES:],
+        joint_position=drive.robot_order(poses[:, BASE_COORDINATES:]),
         momentum=np.array(momenta),
         momentum_share=largest_shares(*body_momenta(*bodies, com, axes, velocity, system_com)),
         tracking_error=float(error),

@@ -11,9 +11,13 @@ import pytest
 
 import jffsr
 from jffsr.crosscheck.compare import attitude_difference, crosscheck
-from jffsr.crosscheck.drive import check_x64
+from jffsr.crosscheck.drive import check_x64, make_drive
+from jffsr.crosscheck.mujoco_model import branch_order
+from jffsr.crosscheck.mujoco_run import run_mujoco
 from jffsr.crosscheck.report import Comparison, CrosscheckReport, Tolerances
 from jffsr.errors import InputError
+from jffsr.robots.builder import build_robot
+from jffsr.robots.yaml_schema import RobotModel
 
 MOMENTUM = np.array([1.0, -2.0, 0.5, 0.8, -0.6, 1.1])
 
@@ -68,6 +72,43 @@ def test_mjx_agrees_with_mujoco(tumbled):
 def test_mjx_agrees_with_mujoco_on_a_tree(tree, tree_trajectory, tumbled):
     """The same with branches and a prismatic joint, which takes long to compile."""
     check_mjx(crosscheck(tree, tree_trajectory, tumbled, momentum=MOMENTUM, steps=(1e-2, 5e-3)))
+
+
+def test_joints_that_are_numbered_across_branches(tumbled):
+    """Two arms whose joints take turns: MuJoCo numbers one arm to its end before the other."""
+    link = {"mass": 4.0, "com": [0.3, 0.0, 0.05], "inertia": {"xx": 0.05, "yy": 0.3, "zz": 0.3}}
+
+    def joint(name, parent, child, position, axis):
+        place = {"parent": parent, "child": child, "position": position}
+        return {"name": name, "type": "revolute", "axis": axis, **place}
+
+    model = RobotModel.model_validate(
+        {
+            "name": "turns",
+            "base": {"name": "base", "mass": 40.0, "inertia": {"xx": 5.0, "yy": 6.0, "zz": 7.0}},
+            "links": [{"name": name, **link} for name in ("left1", "right1", "left2", "right2")],
+            "joints": [
+                joint("left_shoulder", "base", "left1", [0.5, 0.3, 0.0], [0, 0, 1]),
+                joint("right_shoulder", "base", "right1", [-0.5, 0.2, 0.0], [0, 1, 0]),
+                joint("left_elbow", "left1", "left2", [0.6, 0.0, 0.1], [0, 1, 0]),
+                joint("right_elbow", "right1", "right2", [0.0, 0.1, 0.6], [1, 0, 0]),
+            ],
+        }
+    )
+    robot = build_robot(model.describe("turns"))
+    assert robot.topology.parents == (0, 0, 1, 2)
+    np.testing.assert_array_equal(branch_order(robot.topology), [0, 2, 1, 3])
+    start, goal = [0.2, -0.1, 0.5, -0.4], [1.0, 0.6, -0.6, 0.7]
+    trajectory = jffsr.SinePolynomial.between(start, goal, [-2.0] * 4, [2.0] * 4, 2.0)
+    report = crosscheck(robot, trajectory, tumbled, momentum=MOMENTUM, engines=["mujoco"])
+    assert report.passed, report.sentence
+    assert report.comparisons[-1].attitude < 1e-6
+    drive = make_drive(
+        robot, trajectory, tumbled, np.linspace(0, 2, 11), 1e-2, np.array(MOMENTUM, dtype=float)
+    )
+    motion = run_mujoco(robot, drive)
+    np.testing.assert_allclose(motion.joint_position[0], start, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(motion.joint_position[-1], goal, rtol=0, atol=1e-4)
 
 
 def test_wrong_mass_fails(tree, tree_trajectory, tumbled):
