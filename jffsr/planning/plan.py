@@ -75,8 +75,7 @@ class SearchInterrupted(Exception):
         self.outcome = outcome
 
 
-# It runs once, in milliseconds: left unoptimised, it compiles in 0.6 of the time.
-@partial(jax.jit, static_argnums=2, compiler_options={"xla_backend_optimization_level": 0})
+@partial(jax.jit, static_argnums=2)
 def _verified(problem: Problem, candidate, step_factor: int):
     motion, verification = verify(problem, candidate, step_factor)
     return motion, problem.objective.breakdown(problem.robot, motion), verification

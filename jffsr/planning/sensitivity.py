@@ -8,7 +8,6 @@ norms are zero, which is where an optimizer ends; so the derivative of the index
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import jax
@@ -142,8 +141,7 @@ def sensitivity(problem: Problem, free: Vector) -> Sensitivity:
     return Sensitivity(robot.body_names, names[0] if names else None, nominal, derivative)
 
 
-# It runs in milliseconds however it is compiled, and without optimisation it compiles in half the time.
-@partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
+@jax.jit
 def _jacobian(problem: Problem, free: Vector) -> tuple[Inertials, PlanEnd]:
     robot = problem.robot
     inertia = jnp.asarray(robot.inertia)
