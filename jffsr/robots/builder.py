@@ -9,6 +9,8 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.reading.did_you_mean import hint
 from jffsr.robots.checks import check_joint, check_link, check_names, check_pose, check_shape
+from jffsr.robots.composing.joining import join
+from jffsr.robots.composing.seat import ROOT, Seat, end_effector_seat, find_seat
 from jffsr.robots.description import (
     FIXED,
     ArmDescription,
@@ -18,11 +20,9 @@ from jffsr.robots.description import (
     RobotDescription,
 )
 from jffsr.robots.geometry import Geometry
-from jffsr.robots.joining import join
 from jffsr.robots.lumping import Part, lump
 from jffsr.robots.rigid_body import RigidBody
 from jffsr.robots.robot import Limits, Robot, Topology
-from jffsr.robots.seat import ROOT, Seat, end_effector_seat, find_seat
 
 
 def build_robot(description: RobotDescription) -> Robot:

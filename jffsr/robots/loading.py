@@ -18,10 +18,10 @@ from jffsr.reading.xml_tree import parse_xml
 from jffsr.reading.yaml_lines import parse
 from jffsr.robots.builder import build_robot
 from jffsr.robots.description import RobotDescription
-from jffsr.robots.mjcf import describe_mjcf
+from jffsr.robots.formats.mjcf import describe_mjcf
+from jffsr.robots.formats.urdf import describe_urdf
 from jffsr.robots.robot import Robot
 from jffsr.robots.trail import Trail
-from jffsr.robots.urdf import describe_urdf
 from jffsr.robots.yaml_schema import RobotModel
 
 YAML_SUFFIXES = (".yaml", ".yml")

@@ -18,8 +18,8 @@ from jffsr.robots.description import (
     LinkDescription,
     RobotDescription,
 )
+from jffsr.robots.formats.rpy import matrix_to_quaternion, matrix_to_rpy, quaternion_to_matrix, rpy_to_matrix
 from jffsr.robots.geometry import Shape
-from jffsr.robots.rpy import matrix_to_quaternion, matrix_to_rpy, quaternion_to_matrix, rpy_to_matrix
 
 NAMES = [*jffsr.list_robots(), "two_arms", "tree_prismatic"]
 SUFFIXES = [".urdf", ".xml", ".mjcf"]

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.robots.composing.seat import Seat
 from jffsr.robots.geometry import Geometry, Shape
 from jffsr.robots.lumping import on_host
 from jffsr.robots.rigid_body import RigidBody
 from jffsr.robots.robot import Robot, Topology
-from jffsr.robots.seat import Seat
 from jffsr.types import Array, Matrix3, Vector3
 
 

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 from jffsr.errors import InputError
 from jffsr.reading.files import read_text
 from jffsr.reading.xml_tree import Node, parse_xml
-from jffsr.robots.xml_values import MOST_BODIES, NUMBER
+from jffsr.robots.formats.xml_values import MOST_BODIES, NUMBER
 
 _MOST_INCLUDES = 100
 _MOST_ELEMENTS = 100_000

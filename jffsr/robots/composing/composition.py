@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.robots.joining import DROP, KEEP, join
+from jffsr.robots.composing.joining import DROP, KEEP, join
+from jffsr.robots.composing.seat import end_effector_seat, find_seat
 from jffsr.robots.lumping import on_host, quaternion_rotation, to_array
 from jffsr.robots.rigid_body import RigidBody
 from jffsr.robots.robot import Robot
-from jffsr.robots.seat import end_effector_seat, find_seat
 from jffsr.types import Matrix3, Quaternion, Vector3
 
 

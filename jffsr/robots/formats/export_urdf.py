@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from jffsr.robots.export_xml import comment, decimal, decimals, safe_name, unique, xml_text
+from jffsr.robots.formats.export_xml import comment, decimal, decimals, safe_name, unique, xml_text
+from jffsr.robots.formats.rpy import matrix_to_rpy
 from jffsr.robots.geometry import BOX, CAPSULE, CYLINDER, MESH, SPHERE, Shape
 from jffsr.robots.robot import REVOLUTE, Robot
-from jffsr.robots.rpy import matrix_to_rpy
 
 NO_LIMIT = 1e308
 """Stands for a limit that a joint has not: readers of URDF ask for a number and do not know `inf`."""

@@ -16,12 +16,12 @@ from jffsr.robots.description import (
     LinkDescription,
     RobotDescription,
 )
-from jffsr.robots.leaves import leaf_end_effectors
-from jffsr.robots.mjcf_compile import compile_mjcf
-from jffsr.robots.mjcf_shapes import read_shapes
-from jffsr.robots.mjcf_text import Prepared, prepare
+from jffsr.robots.formats.leaves import leaf_end_effectors
+from jffsr.robots.formats.mjcf_compile import compile_mjcf
+from jffsr.robots.formats.mjcf_shapes import read_shapes
+from jffsr.robots.formats.mjcf_text import Prepared, prepare
+from jffsr.robots.formats.rpy import quaternion_to_matrix
 from jffsr.robots.robot import PRISMATIC, REVOLUTE
-from jffsr.robots.rpy import quaternion_to_matrix
 
 UNLIMITED = 1e9
 """A range beyond this has no end: MuJoCo's largest number is 1e10."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.reading.files import read_bytes
-from jffsr.robots.rpy import quaternion_to_matrix
+from jffsr.robots.formats.rpy import quaternion_to_matrix
 
 SUFFIXES = (".stl", ".obj", ".msh")
 MAX_BYTES = 100_000_000

@@ -8,10 +8,10 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.reading.xml_tree import Node
+from jffsr.robots.formats.mesh_files import find_mesh, read_mesh
+from jffsr.robots.formats.rpy import rpy_to_matrix
+from jffsr.robots.formats.xml_values import number, numbers
 from jffsr.robots.geometry import BOX, CAPSULE, COLLISION, CYLINDER, MESH, SPHERE, VISUAL, Shape
-from jffsr.robots.mesh_files import find_mesh, read_mesh
-from jffsr.robots.rpy import rpy_to_matrix
-from jffsr.robots.xml_values import number, numbers
 
 Colour = tuple[float, float, float, float]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from jffsr.errors import InputError
-from jffsr.robots.mjcf_assets import give_meshes
-from jffsr.robots.mjcf_text import Prepared
+from jffsr.robots.formats.mjcf_assets import give_meshes
+from jffsr.robots.formats.mjcf_text import Prepared
 
 
 def compile_mjcf(prepared: Prepared, shown: str, folder: Path) -> tuple[Any, Any]:

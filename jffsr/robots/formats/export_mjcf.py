@@ -6,11 +6,11 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from jffsr.robots.export_xml import decimal, decimals, safe_name, unique, xml_text
+from jffsr.robots.formats.export_xml import decimal, decimals, safe_name, unique, xml_text
+from jffsr.robots.formats.mjcf_shapes import COLLISION_GROUP
+from jffsr.robots.formats.rpy import matrix_to_quaternion
 from jffsr.robots.geometry import COLLISION, MESH, VISUAL, Shape
-from jffsr.robots.mjcf_shapes import COLLISION_GROUP
 from jffsr.robots.robot import REVOLUTE, Robot
-from jffsr.robots.rpy import matrix_to_quaternion
 
 _WIDEST = 1e10
 """MuJoCo's largest number; it stands for the open end of a range."""

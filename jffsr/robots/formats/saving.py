@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.robots.export_mjcf import to_mjcf
-from jffsr.robots.export_urdf import urdf_text
-from jffsr.robots.export_xml import unique
+from jffsr.robots.formats.export_mjcf import to_mjcf
+from jffsr.robots.formats.export_urdf import urdf_text
+from jffsr.robots.formats.export_xml import unique
 from jffsr.robots.geometry import MESH, Shape
 from jffsr.robots.robot import Robot
 

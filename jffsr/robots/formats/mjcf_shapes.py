@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.robots.formats.mesh_files import compiled_mesh
+from jffsr.robots.formats.rpy import quaternion_to_matrix
 from jffsr.robots.geometry import (
     BOX,
     CAPSULE,
@@ -18,8 +20,6 @@ from jffsr.robots.geometry import (
     VISUAL,
     Shape,
 )
-from jffsr.robots.mesh_files import compiled_mesh
-from jffsr.robots.rpy import quaternion_to_matrix
 
 COLLISION_GROUP = 3
 """Geoms of this group and above are not drawn by MuJoCo's viewer: they are there for contact."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import jax
 import numpy as np
 
-from jffsr.robots.joining_static import joined_geometry, joined_topology, kept_tools
+from jffsr.robots.composing.names_and_shapes import joined_geometry, joined_topology, kept_tools
+from jffsr.robots.composing.seat import Seat
 from jffsr.robots.lumping import array_module, lump, to_array
 from jffsr.robots.rigid_body import RigidBody
 from jffsr.robots.robot import Robot
-from jffsr.robots.seat import Seat
 from jffsr.types import Array
 
 KEEP, DROP = "keep", "drop"

@@ -16,12 +16,11 @@ from jffsr.robots.description import (
     LinkDescription,
     RobotDescription,
 )
-from jffsr.robots.leaves import leaf_end_effectors
-from jffsr.robots.robot import PRISMATIC, REVOLUTE
-from jffsr.robots.rpy import rpy_to_matrix
-from jffsr.robots.urdf_root import FLOATING, settle_root
-from jffsr.robots.urdf_shapes import read_shapes
-from jffsr.robots.xml_values import (
+from jffsr.robots.formats.leaves import leaf_end_effectors
+from jffsr.robots.formats.rpy import rpy_to_matrix
+from jffsr.robots.formats.urdf_root import FLOATING, settle_root
+from jffsr.robots.formats.urdf_shapes import read_shapes
+from jffsr.robots.formats.xml_values import (
     MOST_BODIES,
     at_most_one,
     bound,
@@ -31,6 +30,7 @@ from jffsr.robots.xml_values import (
     numbers,
     only_attributes,
 )
+from jffsr.robots.robot import PRISMATIC, REVOLUTE
 
 _TYPES = {
     "revolute": REVOLUTE,

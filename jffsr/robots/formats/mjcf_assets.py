@@ -6,7 +6,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from jffsr.errors import InputError
-from jffsr.robots.mesh_files import mesh_bytes
+from jffsr.robots.formats.mesh_files import mesh_bytes
 
 
 def give_meshes(spec: Any, shown: str, folder: Path) -> list[str]:

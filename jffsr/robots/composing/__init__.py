@@ -1,0 +1,1 @@
+"""Robots out of parts: where a part sits, and how two become one."""

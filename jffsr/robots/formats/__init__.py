@@ -1,0 +1,1 @@
+"""Files of other programs: URDF and MJCF, read and written, with their meshes."""
