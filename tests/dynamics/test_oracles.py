@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import chex
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,7 @@ from jffsr.robots.loading import load_robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_to_matrix
 
+DATA = Path(__file__).parents[1] / "data"
 TOLERANCE = 1e-11
 QUANTITIES = [
     "H_b", "H_bm", "H_m", "H_reduced", "system_com", "momentum", "base_twist_zero_momentum",
@@ -108,10 +111,10 @@ def _evaluate(robot, inputs):
 
 @pytest.fixture(scope="module", params=["wu6", "planar2"])
 def compared(request, oracles):
-    """Ours and the oracle's numbers of all cases of one robot; ours from one compiled call."""
-    oracle = oracles[request.param]
-    cases = _cases(oracle.data)
-    ours = jax.jit(jax.vmap(_evaluate, in_axes=(None, 0)))(oracle.robot, _inputs(cases))
+    """Ours, of the robot in the URDF file, and the oracle's numbers of all cases; ours from one compiled call."""
+    cases = _cases(oracles[request.param].data)
+    robot = load_robot(DATA / "oracle" / f"{request.param}.urdf")
+    ours = jax.jit(jax.vmap(_evaluate, in_axes=(None, 0)))(robot, _inputs(cases))
     return ours, _expected(cases)
 
 
