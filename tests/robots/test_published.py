@@ -127,9 +127,8 @@ def test_era_is_the_same_from_either_end(robots):
     description = describe_robot("era_7dof")
     arm, joints = description.links[1:], description.joints[1:]
     tool = description.end_effectors[0].position
-    turned = np.array(
-        [[0, 0, 1], [0, 1, 0], [1, 0, 0]]
-    )  # what points up before the elbow points ahead after it
+    # What points up before the elbow points ahead after it.
+    turned = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0]])
     np.testing.assert_array_equal([link.mass for link in arm], [link.mass for link in arm[::-1]])
     gaps = np.array([*(joint.position for joint in joints), tool])
     np.testing.assert_array_equal(gaps, gaps[::-1] @ turned)
