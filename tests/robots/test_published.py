@@ -82,7 +82,7 @@ def test_ets7_is_mended_as_its_notes_say(robots, body, published):
 
 
 @pytest.mark.parametrize(
-    "name", ["ets7_6dof", "astrobee_2dof", "canadarm2_7dof", "vispa_6dof", "li_2022_7dof"]
+    "name", ["ets7_6dof", "astrobee_2dof", "canadarm2_7dof", "era_7dof", "vispa_6dof", "li_2022_7dof"]
 )
 def test_notes_tell_the_published_from_the_rest(name):
     notes = describe_robot(name).notes
@@ -105,6 +105,53 @@ def test_canadarm2_has_the_mass_and_the_length_of_its_data_sheet(robots):
     limits = robot.limits
     np.testing.assert_allclose(limits.position_upper, np.deg2rad(270))
     np.testing.assert_allclose(limits.velocity, 0.0698132, rtol=1e-6)
+
+
+def test_era_has_the_mass_the_length_and_the_reach_of_its_fact_sheet(robots):
+    robot = robots["era_7dof"]
+    np.testing.assert_allclose(robot.mass.sum(), 20_350 + 630)
+    # Every posture at right angles, from the foot's face; the base's centre of mass lies a little up, towards it.
+    turns = 0.5 * np.pi * np.array([[0, *q, 0] for q in product((-1, 0, 1, 2), repeat=5)])
+    tools, _, _ = poses(robot, turns)
+    face = np.array([0, 0, 2.125 - 60 * (2.125 + 0.4) / 20_410])
+    np.testing.assert_allclose(np.linalg.norm(tools - face, axis=1).max(), 11.3, atol=1e-9)
+    # The same from the shoulder's pitch axis, which the rolls and yaws before it leave where it is.
+    still = tools[turns[:, 1] == 0]
+    pitch = face + np.array([0, 0, 1.6])
+    np.testing.assert_allclose(np.linalg.norm(still - pitch, axis=1).max(), 9.7, atol=1e-9)
+    assert not np.isfinite(robot.limits.torque).any()
+
+
+def test_era_is_the_same_from_either_end(robots):
+    """ESA: both ends act as hand or as base. The chain read backwards has the same masses, gaps and axes."""
+    description = describe_robot("era_7dof")
+    arm, joints = description.links[1:], description.joints[1:]
+    tool = description.end_effectors[0].position
+    # What points up before the elbow points ahead after it.
+    turned = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0]])
+    np.testing.assert_array_equal([link.mass for link in arm], [link.mass for link in arm[::-1]])
+    gaps = np.array([*(joint.position for joint in joints), tool])
+    np.testing.assert_array_equal(gaps, gaps[::-1] @ turned)
+    axes = np.array([joint.axis for joint in joints])
+    np.testing.assert_array_equal(axes, axes[::-1] @ turned)
+    for gap, link, other in zip(gaps, arm, arm[::-1], strict=True):
+        np.testing.assert_allclose(link.com, 0.5 * gap)
+        np.testing.assert_allclose(link.inertia, turned @ other.inertia @ turned)
+
+
+def test_era_limbs_are_a_tube_between_two_drives(robots):
+    """The solids that the notes name, summed grain by grain on rings along the limb instead of by formula."""
+    robot = robots["era_7dof"]
+    at = (np.arange(4000) + 0.5) / 4000
+    disc = 0.15 * np.sqrt(at)  # radii that share a disc's area evenly
+    stations = np.concatenate([0.4 * at, 4.05 * at, 4.05 - 0.4 * at])
+    squares = np.repeat([np.mean(disc**2), 0.125**2, np.mean(disc**2)], 4000)
+    grain = np.repeat([50.0, 65.0, 50.0], 4000) / 4000
+    middle = grain @ stations / 165
+    across = grain @ (0.5 * squares + (stations - middle) ** 2)
+    body = robot.body_names.index("limb2")
+    np.testing.assert_allclose(robot.link_com[body - 1], [middle, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(np.diag(robot.inertia[body]), [grain @ squares, across, across], rtol=1e-6)
 
 
 def test_vispa_stands_straight_up_at_zero(robots):
