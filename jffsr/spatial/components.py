@@ -91,3 +91,10 @@ def quaternion_rows(q: tuple[Array, Array, Array, Array]) -> Rows:
 def rows_transposed_times(m: Rows, v: Components) -> Components:
     """M' v."""
     return tuple(dot(column, v) for column in zip(*m, strict=True))
+
+
+def symmetric_turned(m: Rows, s: Symmetric) -> Symmetric:
+    """M S M'."""
+    xx, yy, zz, xy, xz, yz = s
+    half = rows_product(m, ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+    return tuple(dot(half[r], m[k]) for r, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))

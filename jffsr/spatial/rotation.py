@@ -134,3 +134,20 @@ def quaternion_to_euler_zxy(q: Quaternion) -> Vector3:
     about_x = jnp.arctan2(r[..., 2, 1], cosine)
     about_y = safe_atan2(-r[..., 2, 0], r[..., 2, 2])
     return jnp.stack([about_z, about_x, about_y], axis=-1)
+
+
+def frame_along(axis: Vector3) -> Matrix3:
+    """Rotation matrices (..., 3, 3) whose third column points along `axis` (..., 3), of any length.
+
+    Which of them is of no account; it jumps where the axis's z changes sign (Duff et al., "Building an
+    orthonormal basis, revisited", 2017), so use it only where any of them gives the same.
+    """
+    # Off unit length the columns would not be orthogonal, and the choice would show.
+    axis = axis / jnp.sqrt(jnp.sum(axis * axis, axis=-1, keepdims=True))
+    x, y, z = jnp.moveaxis(axis, -1, 0)
+    sign = jnp.where(z < 0, -1.0, 1.0)
+    a = -1 / (sign + z)
+    b = x * y * a
+    first = jnp.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    second = jnp.stack([b, sign + y * y * a, -y], axis=-1)
+    return jnp.stack([first, second, axis], axis=-1)

@@ -22,6 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.spatial.trigonometry import sine_cosine
 from jffsr.types import Array, Scalar, Vector
 
 # arcsin has an infinite slope at a limit; closer than this share of the half range counts as on it.
@@ -124,7 +125,7 @@ class SinePolynomial:
         p = u0 + (u1 - u0) * ramp + bump * shape
         p_1 = ((u1 - u0) * ramp_1 + bump_1 * shape + 2 * bump * beta) / self.duration
         p_2 = ((u1 - u0) * ramp_2 + bump_2 * shape + 4 * bump_1 * beta) / self.duration**2
-        sine, cosine = jnp.sin(p), jnp.cos(p)
+        sine, cosine = sine_cosine(p)
         return (
             middle + half * sine,
             half * cosine * p_1,

@@ -1,4 +1,4 @@
-"""A small seeded share of `make check-physics`: three topologies, four robots each, every law."""
+"""A small seeded share of `make check-physics`: two topologies, four robots each, every law."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from laws import TOLERANCE, batch_of, check
 LAWS = 28
 
 
-@pytest.mark.parametrize("number", [2, 5, 7])
+@pytest.mark.parametrize("number", [2, 6])
 def test_every_law_holds(number):
     batch = batch_of(1, number, 4)
     assert batch.torques.shape == (4, number + 1)

@@ -50,12 +50,13 @@ def problem(robot):
 
 
 def planned(problem, **keywords):
+    keywords = {"with_sensitivity": False, **keywords}
     return solve(problem, "hybrid", SETTINGS, chunk=6, tolerances=COARSE, **keywords)
 
 
 @pytest.fixture(scope="module")
 def plan(problem):
-    return planned(problem)
+    return planned(problem, with_sensitivity=True)
 
 
 def test_plan_is_consistent(problem, plan):

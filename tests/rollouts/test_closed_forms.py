@@ -69,7 +69,9 @@ def one_link():
     """The base and the first link of the same arm."""
     whole = describe_robot("hu_2011_planar2")
     return build_robot(
-        dataclasses.replace(whole, links=whole.links[:2], joints=whole.joints[:1], end_effectors=())
+        dataclasses.replace(
+            whole, links=whole.links[:2], joints=whole.joints[:1], end_effectors=(), shapes=()
+        )
     )
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from jffsr.spatial.rotation import (
     axis_angle_to_matrix,
+    frame_along,
     matrix_to_quaternion,
     quaternion_conjugate,
     quaternion_multiply,
@@ -176,3 +177,17 @@ def test_euler_zxy_at_its_singularity(sign):
     np.testing.assert_allclose(angles[1], sign * np.pi / 2, rtol=0, atol=1e-7)
     np.testing.assert_allclose(_from_zxy(angles), quaternion_to_matrix(q), rtol=0, atol=1e-7)
     chex.assert_tree_all_finite(jax.jacrev(quaternion_to_euler_zxy)(q))
+
+
+def test_a_frame_along_an_axis_is_a_rotation_with_that_axis():
+    rng = np.random.default_rng(5)
+    axes = np.concatenate(
+        [rng.normal(size=(200, 3)), np.eye(3), -np.eye(3), [[1e-9, 0, -1.0], [0, 1e-9, 1.0]]]
+    )
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    frames = np.asarray(frame_along(axes))
+    np.testing.assert_allclose(frames[..., 2], axes, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(
+        frames @ np.swapaxes(frames, 1, 2), np.tile(np.eye(3), (len(axes), 1, 1)), atol=1e-14
+    )
+    np.testing.assert_allclose(np.linalg.det(frames), 1, rtol=1e-13)

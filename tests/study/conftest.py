@@ -9,6 +9,7 @@ import pytest
 SMALL = (
     "rollout.num_steps=8",
     "verification.step_factor=2",
+    "verification.sensitivity=false",
     "optimizer.kind=hybrid",
     "optimizer.particles=4",
     "optimizer.swarm_evaluations=16",

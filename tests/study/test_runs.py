@@ -30,7 +30,8 @@ def run(capsys, *arguments: str) -> tuple[int, str, str]:
 def finished(tmp_path_factory, small):
     """A small finished run."""
     folder = tmp_path_factory.mktemp("runs") / "finished"
-    assert cli.main(["run", CONFIG, *small, "--out", str(folder)]) == cli.NOT_MET
+    overrides = [*small, "verification.sensitivity=true"]
+    assert cli.main(["run", CONFIG, *overrides, "--out", str(folder)]) == cli.NOT_MET
     return folder
 
 
@@ -132,7 +133,7 @@ def test_a_damaged_checkpoint_is_told(finished, small, tmp_path, capsys):
     folder.mkdir()
     (folder / "config.yaml").write_bytes((finished / "config.yaml").read_bytes())
     (folder / "checkpoint.npz").write_bytes(b"PK\x03\x04 half a file")
-    status, _, err = run(capsys, CONFIG, *small, "--out", str(folder))
+    status, _, err = run(capsys, CONFIG, *small, "verification.sensitivity=true", "--out", str(folder))
     assert status == cli.BAD_INPUT
     assert "the checkpoint cannot be read" in err
 
@@ -170,7 +171,6 @@ def test_impossible_is_refused_before_any_search(small, tmp_path, capsys):
 
 def test_float32_is_searched_and_verified_in_float64(small, tmp_path):
     swarm = [*small, "precision=float32", "optimizer.kind=qpso", "optimizer.evaluations=16"]
-    swarm.append("verification.sensitivity=false")
     code = (
         "import sys; from jffsr.cli import main; "
         f"sys.exit(main(['run', {CONFIG!r}, *{swarm!r}, '--out', {str(tmp_path / 'f')!r}]))"
