@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 
 import pytest
-from loading_guard import SECONDS, within
+from loading_guard import SECONDS
 from robot_texts import DATA, MJCF, URDF
+from time_limit import within
 
 import jffsr
 from jffsr.errors import InputError

@@ -12,8 +12,9 @@ import numpy as np
 import plain_reading
 import pytest
 import xml_mutations
-from loading_guard import attempt, within
+from loading_guard import attempt
 from robot_texts import DATA, MJCF, URDF
+from time_limit import within
 
 import jffsr
 

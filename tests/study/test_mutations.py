@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import random
-import signal
-from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
 
 import jax
 import pytest
 from mutations import mutate
+from time_limit import within
 
 from jffsr import cli
 from jffsr.errors import InputError
@@ -38,22 +37,6 @@ STUDIES = {
 ROBOTS = [DATA / f"{name}.yaml" for name in sorted(STUDIES)]
 SHARES = 10
 SECONDS = 5.0
-
-
-@contextmanager
-def within(seconds: float):
-    """Fail what takes longer: a hang is told, not waited for."""
-
-    def stop(number, frame):
-        raise TimeoutError(f"took over {seconds} s")
-
-    old = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, old)
 
 
 @pytest.fixture(scope="module")
