@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,12 @@ import jax
 import pytest
 
 jax.config.update("jax_enable_x64", True)
+
+from jffsr.compiling import OPTIONS  # noqa: E402
+
+# The tests' own programs get the options of the package's: they have to stand here before the first computation.
+for option, value in (OPTIONS or {}).items():
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --{option}={str(value).lower()}".strip()
 
 from motions import robot_from_record  # noqa: E402
 

@@ -20,6 +20,7 @@ ORDER = [
     "errors",
     "reading",
     "types",
+    "compiling",
     "spatial",
     "robots",
     "dynamics",

@@ -8,6 +8,7 @@ from dataclasses import replace
 import jax
 import numpy as np
 
+from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -46,7 +47,7 @@ def fine_motion(
         return replace(motion, **{name: getattr(motion, name)[::per_sample] for name in names})
 
     # Compiled as a whole: operation by operation, JAX would compile every one of them.
-    run = jax.jit(jax.vmap(sampled, in_axes=(0, None, None)) if stacked else sampled)
+    run = jit(jax.vmap(sampled, in_axes=(0, None, None)) if stacked else sampled)
     return run(robot, initial_state, momentum)
 
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
 from jffsr.types import Array
@@ -86,7 +87,7 @@ class Outcome:
         return self.reason == "interrupted"
 
 
-@jax.jit
+@jit
 def _init(optimizer, problem, key, population):
     # A step gives back strongly typed numbers: a weakly typed start would compile the first chunk on its own.
     return jax.tree.map(_strongly_typed, optimizer.init(key, problem, population))
@@ -111,7 +112,7 @@ def _advance(optimizer, problem, state, stop, length):
     return jax.lax.scan(one, state, idle)
 
 
-_advance_jit = jax.jit(_advance, static_argnums=4)
+_advance_jit = jit(_advance, static_argnums=4)
 
 
 def run(

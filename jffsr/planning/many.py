@@ -9,6 +9,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 
+from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.plan import check_precision
@@ -74,7 +75,7 @@ def plan_many(
     return _plan_batch(stacked, optimizers, keys, lengths, step_factor, tolerances)
 
 
-@partial(jax.jit, static_argnums=(3, 4, 5))
+@partial(jit, static_argnums=(3, 4, 5))
 def _plan_batch(problems, optimizers, keys, lengths, step_factor, tolerances):
     def one(problem: Problem, key: Array) -> Plans:
         population, evaluations, gradients, best = None, 0, 0, []

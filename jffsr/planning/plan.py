@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
@@ -75,7 +76,7 @@ class SearchInterrupted(Exception):
         self.outcome = outcome
 
 
-@partial(jax.jit, static_argnums=2)
+@partial(jit, static_argnums=2)
 def _verified(problem: Problem, candidate, step_factor: int):
     motion, verification = verify(problem, candidate, step_factor)
     return motion, problem.objective.breakdown(problem.robot, motion), verification

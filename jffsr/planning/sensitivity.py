@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.compiling import jit
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.planning.problem import Problem
 from jffsr.robots.state import State
@@ -141,7 +142,7 @@ def sensitivity(problem: Problem, free: Vector) -> Sensitivity:
     return Sensitivity(robot.body_names, names[0] if names else None, nominal, derivative)
 
 
-@jax.jit
+@jit
 def _jacobian(problem: Problem, free: Vector) -> tuple[Inertials, PlanEnd]:
     robot = problem.robot
     inertia = jnp.asarray(robot.inertia)
