@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
@@ -231,6 +232,8 @@ def rpy_deg_to_matrix(rpy_deg: tuple[float, ...]) -> np.ndarray:
     """R = Rz(yaw) Ry(pitch) Rx(roll) of three angles in degrees, exact at multiples of 90 degrees."""
     rotation = np.eye(3)
     for axis, angle in enumerate(rpy_deg):
+        # The remainder is exact, so that many whole turns cost no digits.
+        angle = math.fmod(angle, 360.0) if math.isfinite(angle) else math.nan
         c, s = _exact_cosine(angle), _exact_cosine(angle - 90)
         i, j = (axis + 1) % 3, (axis + 2) % 3
         turn = np.eye(3)
@@ -241,9 +244,9 @@ def rpy_deg_to_matrix(rpy_deg: tuple[float, ...]) -> np.ndarray:
 
 def _exact_cosine(degrees: float) -> float:
     # cos(pi/2) is 6e-17 in floating point, which would tilt every axis that a file states as parallel.
-    if np.isfinite(degrees) and degrees % 90 == 0:
+    if degrees % 90 == 0:
         return (1.0, 0.0, -1.0, 0.0)[int(degrees // 90) % 4]
-    return float(np.cos(np.deg2rad(degrees))) if np.isfinite(degrees) else float("nan")
+    return float(np.cos(np.deg2rad(degrees)))
 
 
 def _link(link: LinkModel) -> LinkDescription:

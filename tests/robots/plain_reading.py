@@ -115,7 +115,7 @@ def of_yaml(text: str, base: str) -> Snapshot:
     joints = []
     for joint in record["joints"]:
         turn = Rotation.from_euler(
-            "xyz", np.deg2rad(np.array(joint.get("rpy_deg", (0, 0, 0)), float))
+            "xyz", np.deg2rad(np.fmod(np.array(joint.get("rpy_deg", (0, 0, 0)), float), 360))
         ).as_matrix()
         axis = np.array(joint.get("axis", (0, 0, 1)), float)
         position = np.array(joint.get("position", (0, 0, 0)), float)

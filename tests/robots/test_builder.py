@@ -370,3 +370,11 @@ def test_a_robot_without_end_effectors_is_a_robot():
     with pytest.raises(InputError, match="robot 'arm' has no end effector 'None'; it has \\[\\]"):
         robot.end_effector_index(None)
     assert jax.tree.structure(robot) == jax.tree.structure(robot.replace(mass=2 * robot.mass))
+
+
+def test_whole_turns_cost_no_digits():
+    """A remainder of degrees is exact; radians of as many turns have a ten-thousandth of a turn to spare."""
+    turns = 360.0 * 2**36
+    found = rpy_deg_to_matrix((30.0 + turns, -75.0 - turns, 90.0 + turns))
+    np.testing.assert_array_equal(found, rpy_deg_to_matrix((30.0, -75.0, 90.0)))
+    assert np.isnan(rpy_deg_to_matrix((0.0, np.inf, 0.0))).any()
