@@ -12,7 +12,7 @@ from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
-from jffsr.rollouts.motion import Motion
+from jffsr.rollouts.motion import SAMPLED, Motion
 from jffsr.rollouts.reference import reference_rollout
 from jffsr.trajectories.interface import Trajectory
 
@@ -35,16 +35,7 @@ def fine_motion(
 
     def sampled(robot: Robot, start: State, momentum: jax.Array) -> Motion:
         motion = reference_rollout(robot, trajectory, start, duration, _SAMPLES * per_sample, momentum)
-        names = (
-            "time",
-            "base_position",
-            "base_quaternion",
-            "base_twist",
-            "joint_position",
-            "joint_velocity",
-            "joint_acceleration",
-        )
-        return replace(motion, **{name: getattr(motion, name)[::per_sample] for name in names})
+        return replace(motion, **{name: getattr(motion, name)[::per_sample] for name in SAMPLED})
 
     # Compiled as a whole: operation by operation, JAX would compile every one of them.
     run = jit(jax.vmap(sampled, in_axes=(0, None, None)) if stacked else sampled)

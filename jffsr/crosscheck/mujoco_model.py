@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.robots.principal import principal_axes
 from jffsr.robots.robot import REVOLUTE, Robot, Topology
 
 if TYPE_CHECKING:
@@ -115,12 +116,7 @@ def _quaternion(rotation) -> np.ndarray:
 
 
 def _set_inertia(body, robot: Robot, index: int) -> None:
-    """Principal moments and axes, found here: MuJoCo's own diagonalisation stops at about 1e-12."""
-    moments, axes = np.linalg.eigh(np.asarray(robot.inertia[index], dtype=float))
-    # The robot's checks forgive rounding in the triangle inequality; MuJoCo's do not.
-    moments[2] = min(moments[2], moments[0] + moments[1])
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
+    moments, axes = principal_axes(robot.inertia[index])
     body.explicitinertial = True
     body.mass = float(robot.mass[index])
     body.ipos = np.zeros(3) if index == 0 else np.asarray(robot.link_com[index - 1], dtype=float)

@@ -12,7 +12,7 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
-from jffsr.rollouts.motion import Motion
+from jffsr.rollouts.motion import SAMPLED, Motion
 from jffsr.trajectories.interface import Trajectory
 
 
@@ -64,17 +64,7 @@ def to_mat(robot: Robot, motion: Motion, cost: float, path: str | os.PathLike[st
     """The motion as a MATLAB 5 file: arrays under the names of Motion's fields, and joint_names."""
     from scipy.io import savemat
 
-    names = (
-        "time",
-        "base_position",
-        "base_quaternion",
-        "base_twist",
-        "joint_position",
-        "joint_velocity",
-        "joint_acceleration",
-        "momentum",
-    )
-    values = {name: np.asarray(getattr(motion, name)) for name in names}
+    values = {name: np.asarray(getattr(motion, name)) for name in (*SAMPLED, "momentum")}
     values["joint_names"] = np.array(robot.joint_names, dtype=object)
     values["index"] = float(cost)
     savemat(Path(path), values)

@@ -16,6 +16,7 @@ from jffsr.planning.plan import check_precision
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances, result_code, settled
 from jffsr.planning.verification import Verification, verify
+from jffsr.robots.stacking import first_unlike
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
 
@@ -56,15 +57,12 @@ def plan_many(
     problems = list(problems)
     if not problems:
         raise InputError("plan_many was given no problem")
-    first = jax.tree.structure(problems[0])
-    shapes = [jnp.shape(leaf) for leaf in jax.tree.leaves(problems[0])]
-    for number, problem in enumerate(problems):
-        same = jax.tree.structure(problem) == first
-        if not same or [jnp.shape(leaf) for leaf in jax.tree.leaves(problem)] != shapes:
-            raise InputError(
-                f"problem {number} differs from problem 0 in more than numbers (its robot's topology or names, its "
-                f"terms, num_steps, or the shape of an array); plan it apart"
-            )
+    other = first_unlike(problems)
+    if other is not None:
+        raise InputError(
+            f"problem {other} differs from problem 0 in more than numbers (its robot's topology or names, its "
+            f"terms, num_steps, or the shape of an array); plan it apart"
+        )
     check_precision("float64")
     stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(leaf) for leaf in leaves]), *problems)
     phases = build_phases(optimizer, settings or Settings())

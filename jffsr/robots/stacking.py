@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -20,16 +21,23 @@ def stack_robots(robots: Sequence[Robot]) -> Robot:
     robots = list(robots)
     if not robots:
         raise InputError("no robot was given; at least one is needed")
-    first = jax.tree.structure(robots[0])
-    shapes = [np.shape(leaf) for leaf in jax.tree.leaves(robots[0])]
-    for number, robot in enumerate(robots):
-        same = jax.tree.structure(robot) == first
-        if not same or [np.shape(leaf) for leaf in jax.tree.leaves(robot)] != shapes:
-            raise InputError(
-                f"robot {number} ('{robot.name}') differs from robot 0 ('{robots[0].name}') in more than "
-                f"numbers (its topology, names, shapes, or the shape of an array)"
-            )
+    other = first_unlike(robots)
+    if other is not None:
+        raise InputError(
+            f"robot {other} ('{robots[other].name}') differs from robot 0 ('{robots[0].name}') in more than "
+            f"numbers (its topology, names, shapes, or the shape of an array)"
+        )
     return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *robots)
+
+
+def first_unlike(trees: Sequence[Any]) -> int | None:
+    """Index of the first pytree that differs from the first of all in structure or in the shape of a leaf."""
+
+    def kind(tree: Any) -> tuple:
+        return jax.tree.structure(tree), [np.shape(leaf) for leaf in jax.tree.leaves(tree)]
+
+    first = kind(trees[0])
+    return next((number for number, tree in enumerate(trees) if kind(tree) != first), None)
 
 
 def unstack_robots(robots: Robot) -> list[Robot]:

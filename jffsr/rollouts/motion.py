@@ -50,6 +50,18 @@ class Motion:
     base_mode: str = field(default=FLOATING, metadata={"static": True})
 
 
+SAMPLED = (
+    "time",
+    "base_position",
+    "base_quaternion",
+    "base_twist",
+    "joint_position",
+    "joint_velocity",
+    "joint_acceleration",
+)
+"""Fields of a Motion that have a row a sample."""
+
+
 def sample_joints(trajectory: Trajectory, duration: Scalar, num_steps: int) -> JointGrid:
     """The trajectory on the 2 num_steps + 1 points of the grid and its midpoints."""
     time = jnp.linspace(0.0, 1.0, 2 * num_steps + 1) * duration

@@ -25,6 +25,7 @@ import jffsr
 from jffsr.crosscheck.mujoco_model import to_mjmodel
 from jffsr.robots.robot import Robot, Topology
 from jffsr.robots.state import State
+from jffsr.rollouts.joint_terms import joint_terms
 from jffsr.spatial.rotation import quaternion_multiply, quaternion_to_matrix
 
 TOLERANCE = 1e-9
@@ -60,7 +61,11 @@ def evaluate(robot: Robot, state: State, torque):
     h_b, h_bm, h_m = jffsr.inertia_blocks(robot, kin)
     acceleration = jffsr.forward_dynamics(robot, kin, *velocities, torque)
     back, base = jffsr.inverse_dynamics(robot, kin, *velocities, acceleration[6:])
+    terms = joint_terms(robot, state.joint_position[None], state.joint_velocity[None])
     return {
+        "rollout_inertia": jnp.array(terms.inverse_inertia)[:, 0],
+        "rollout_rate": jnp.array(terms.base_rate((0.0, 0.0, 0.0)))[:, 0],
+        "rollout_com_velocity": jnp.array(terms.com_velocity)[:, 0],
         "inertia": jnp.block([[h_b, h_bm], [h_bm.T, h_m]]),
         "bias": jffsr.bias_force(robot, kin, *velocities),
         "acceleration": acceleration,
@@ -106,6 +111,9 @@ def against_mujoco(batch: Batch) -> Errors:
             ("momentum", "momentum"),
             ("kinetic energy", "energy"),
             ("centre of mass", "system_com"),
+            ("rollout, inverse locked inertia", "rollout_inertia"),
+            ("rollout, base rate", "rollout_rate"),
+            ("rollout, velocity of the centre", "rollout_com_velocity"),
         )
     }
     errors["MuJoCo: inverse dynamics, torque"] = relative(torque, batch.torques)
@@ -135,14 +143,29 @@ def _in_mujoco(robot: Robot, state: State, torque: np.ndarray) -> dict[str, np.n
     turn = np.zeros((model.nv, model.nv))
     turn[:3, :3], turn[3:6, 3:6] = np.eye(3), rotation
     turn[6 + np.arange(len(names)), dofs] = 1.0
-    linear = model.body_subtreemass[1] * data.subtree_linvel[1]
+    mass = model.body_subtreemass[1]
+    linear = mass * data.subtree_linvel[1]
+    inertia = turn @ inertia @ turn.T
     return {
-        "inertia": turn @ inertia @ turn.T,
+        **_without_momentum(inertia, mass, data.subtree_com[1] - state.base_position, rotation, state),
+        "inertia": inertia,
         "bias": turn @ data.qfrc_bias,
         "acceleration": turn @ data.qacc,
         "momentum": np.concatenate([linear, data.subtree_angmom[1]]),
         "energy": data.energy[1],
         "system_com": data.subtree_com[1].copy(),
+    }
+
+
+def _without_momentum(inertia, mass, lever, rotation, state: State) -> dict[str, np.ndarray]:
+    """What the rollout takes from the joints, in B, worked out of an inertia matrix in I."""
+    blocks, coupling = inertia[:6, :6], inertia[:6, 6:] @ state.joint_velocity
+    locked = blocks[3:, 3:] - mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+    inverse = np.linalg.inv(rotation.T @ locked @ rotation)
+    return {
+        "rollout_inertia": inverse[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+        "rollout_rate": rotation.T @ -np.linalg.solve(blocks, coupling)[3:],
+        "rollout_com_velocity": rotation.T @ coupling[:3] / mass,
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from laws import TOLERANCE, batch_of, check
 
-LAWS = 28
+LAWS = 31
 
 
 @pytest.mark.parametrize("number", [2, 6])

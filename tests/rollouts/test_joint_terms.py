@@ -1,9 +1,12 @@
 """The base-frame terms of the fast path against the inertia blocks of the readable one.
 
-One chain and one tree with sliding joints; for the other robots the agreement of whole motions says the same.
+One chain, one tree with joints of both kinds, and the same tree with sliding joints alone; for the other robots
+the agreement of whole motions says the same.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import chex
 import jax
@@ -13,6 +16,7 @@ import pytest
 
 from jffsr.dynamics.kinematics import kinematics, system_com
 from jffsr.dynamics.momentum import base_twist, inertia_blocks, momentum
+from jffsr.robots.robot import PRISMATIC
 from jffsr.robots.state import State
 from jffsr.rollouts.joint_terms import joint_terms
 from jffsr.spatial.inertia import parallel_axis, skew
@@ -20,10 +24,13 @@ from jffsr.spatial.inertia import parallel_axis, skew
 STATES = 5
 
 
-@pytest.mark.parametrize("name", ["wu_2018_6dof", "two_arms"])
+@pytest.mark.parametrize("name", ["wu_2018_6dof", "two_arms", "slides"])
 def test_joint_terms_are_the_inertia_blocks_without_linear_momentum(robots, name):
     """With the base at the identity pose I and B coincide; the linear momentum is eliminated by hand."""
-    robot = robots[name]
+    robot = robots["two_arms" if name == "slides" else name]
+    if name == "slides":
+        kinds = (PRISMATIC,) * robot.num_joints
+        robot = robot.replace(topology=replace(robot.topology, joint_types=kinds))
     rng = np.random.default_rng(5)
     q, qd = rng.uniform(-2, 2, (2, STATES, robot.num_joints))
     angular_momentum = rng.normal(size=3)

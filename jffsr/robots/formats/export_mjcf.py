@@ -10,6 +10,7 @@ from jffsr.robots.formats.export_xml import decimal, decimals, safe_name, unique
 from jffsr.robots.formats.mjcf_shapes import COLLISION_GROUP
 from jffsr.robots.formats.rpy import matrix_to_quaternion
 from jffsr.robots.geometry import COLLISION, MESH, VISUAL, Shape
+from jffsr.robots.principal import principal_axes
 from jffsr.robots.robot import REVOLUTE, Robot
 
 _WIDEST = 1e10
@@ -111,16 +112,7 @@ def _joint(element: ET.Element, robot: Robot, joint: int) -> None:
 
 def _inertial(element: ET.Element, robot: Robot, body: int) -> None:
     com = -np.asarray(robot.root_position) if body == 0 else robot.link_com[body - 1]
-    tensor = np.asarray(robot.inertia[body], dtype=float)
-    if np.array_equal(tensor, np.diag(np.diagonal(tensor))):
-        moments, axes = np.diagonal(tensor).copy(), np.eye(3)
-    else:
-        moments, axes = np.linalg.eigh(tensor)
-        if np.linalg.det(axes) < 0:
-            axes[:, 0] = -axes[:, 0]
-    # The robot's checks forgive rounding in the triangle inequality; MuJoCo's do not.
-    largest = int(np.argmax(moments))
-    moments[largest] = min(moments[largest], moments.sum() - moments[largest])
+    moments, axes = principal_axes(robot.inertia[body])
     inertial = ET.SubElement(element, "inertial", mass=decimal(robot.mass[body]))
     _place(inertial, com, axes)
     inertial.set("diaginertia", decimals(moments))
