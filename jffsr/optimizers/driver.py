@@ -2,7 +2,8 @@
 
 A run is a list of phases, each an optimizer with its own stopping rule; a phase starts from the population
 that the one before left (hybrid: a swarm, then gradients). Between chunks the host reports, saves and looks
-for an interrupt. Chunks only group steps: their size does not change the result.
+for an interrupt. Chunks only group steps: their size does not change the result. Populations are evaluated on all
+devices of the mesh in use, else on all there are; everything else is the same on each of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
+from jffsr.parallel.devices import all_devices, on_all_devices
 from jffsr.types import Array
 
 
@@ -135,17 +137,21 @@ def run(
         raise InputError("there is no phase to run")
     history: list[Record] = list(resume.history) if resume else []
     first = resume.phase if resume else 0
-    state = resume.state if resume else None
+    with all_devices():
+        # As a chunk gives it back, so that the first chunk is not compiled on its own.
+        state = on_all_devices(resume.state) if resume else None
     for index in range(first, len(phases)):
         phase = phases[index]
         before = _evaluations_before(history, index)
         if state is None:
-            state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
+            with all_devices():
+                state = _init(phase.optimizer, problem, jax.random.fold_in(key, index), population)
         while not phase.stop.reached(jax.device_get(state.progress)):
             if interrupted():
                 return _outcome(phase, state, history, "interrupted")
             last = int(state.progress.iteration)
-            state, rows = _advance_jit(phase.optimizer, problem, state, phase.stop, chunk)
+            with all_devices():
+                state, rows = _advance_jit(phase.optimizer, problem, state, phase.stop, chunk)
             for row in zip(*jax.device_get(rows), strict=True):
                 if row[0] > last:
                     last = row[0]

@@ -27,6 +27,7 @@ from jffsr.optimizers.interface import (
     no_progress,
     sample_box,
 )
+from jffsr.parallel.mapping import evaluate
 from jffsr.types import Array, Scalar, Vector
 
 LBFGS = "lbfgs"
@@ -142,7 +143,7 @@ class GradientDescent:
         def objective(x: Vector) -> tuple[Scalar, Scalar]:
             return problem.smooth_and_value(x, self.looseness)
 
-        (smooth, value), in_box = jax.vmap(jax.value_and_grad(objective, has_aux=True))(inside)
+        (smooth, value), in_box = evaluate(jax.value_and_grad(objective, has_aux=True), inside)
         _, pull_back = jax.vjp(partial(_all_to_box, problem), trial)
         (gradient,) = pull_back(in_box)
         usable = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)

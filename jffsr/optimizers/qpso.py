@@ -22,6 +22,7 @@ from jffsr.optimizers.interface import (
     no_progress,
     sample_box,
 )
+from jffsr.parallel.mapping import evaluate
 from jffsr.types import Array
 
 
@@ -66,7 +67,7 @@ class QPSO:
     def step(self, problem: OptimizationProblem, state: SwarmState) -> SwarmState:
         """One generation: P evaluations where the swarm stands, then the move to where it goes next."""
         progress = state.progress
-        value = finite_or_inf(jax.vmap(problem.value)(state.position))
+        value = finite_or_inf(evaluate(problem.value, state.position))
         improved = value < state.personal_value
         personal_best = jnp.where(improved[:, None], state.position, state.personal_best)
         personal_value = jnp.where(improved, value, state.personal_value)

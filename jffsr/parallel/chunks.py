@@ -12,32 +12,32 @@ import jax
 
 CPU_BYTES = 4 * 2**20
 """Default limit on a CPU: what was fastest where a core has 1 MiB of second-level and a share of third-level cache."""
+CPU_WHOLE = 4
+"""A batch of up to so many times that limit is not divided: a loop costs more than the slower memory."""
+LANES = 8
+"""Candidates that fill a vector register on a CPU; with fewer at once the rest of it would be idle."""
 MEMORY_SHARE = 0.25
 """Default limit on other devices: this share of the device's memory."""
 UNKNOWN_BYTES = 2 * 2**30
-"""Where a device does not tell its memory."""
-LANES = 8
-"""Candidates that fill a vector register on a CPU; with fewer at once the rest of it would be idle."""
+"""The limit where a device does not tell its memory."""
 
 
 def chunk_size(count: int, item_bytes: int, memory: int | None = None) -> int:
-    """Candidates at a time, at least one, so that `count` of them of `item_bytes` each keep to `memory` bytes.
+    """Candidates at a time, of `count` that need `item_bytes` each, so that they keep to `memory` bytes.
 
-    The chunks of a batch are made alike in size. Without `memory`, the default of the kind of device; on a CPU
-    no fewer than fill a vector register.
+    At least one; the chunks of a batch are made alike in size. Without `memory`, the default of the kind of device,
+    on a CPU in whole vector registers.
     """
-    least = 1
-    if memory is None:
-        memory, least = default_memory()
-    largest = max(least, int(memory) // max(1, item_bytes))
+    device = jax.local_devices()[0]
+    if memory is None and device.platform == "cpu":
+        if count * item_bytes <= CPU_WHOLE * CPU_BYTES:
+            return count
+        largest = max(LANES, CPU_BYTES // item_bytes // LANES * LANES)
+    else:
+        largest = max(1, int(memory or _share(device)) // max(1, item_bytes))
     return math.ceil(count / math.ceil(count / largest))
 
 
-def default_memory() -> tuple[int, int]:
-    """The default limit in bytes of one device, and the fewest candidates that are worth a chunk there."""
-    device = jax.local_devices()[0]
-    if device.platform == "cpu":
-        return CPU_BYTES, LANES
-    stats = device.memory_stats() or {}
-    known = stats.get("bytes_limit")
-    return (int(MEMORY_SHARE * known) if known else UNKNOWN_BYTES), 1
+def _share(device: jax.Device) -> int:
+    known = (device.memory_stats() or {}).get("bytes_limit")
+    return int(MEMORY_SHARE * known) if known else UNKNOWN_BYTES

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import jax
 import numpy as np
-from jax.sharding import AxisType, Mesh
+from jax.sharding import AxisType, Mesh, NamedSharding, PartitionSpec
 
 from jffsr.errors import InputError
 
@@ -69,3 +70,9 @@ def count_devices(axes: tuple[str, ...]) -> int:
     """The number of devices along these axes of the mesh in use."""
     shape = jax.sharding.get_abstract_mesh().shape
     return int(np.prod([shape[axis] for axis in axes], dtype=int))
+
+
+def on_all_devices(tree: Any) -> Any:
+    """The arrays with a copy on every device of the mesh in use, as compiled programs give them back."""
+    mesh = jax.sharding.get_mesh()
+    return tree if mesh.empty else jax.device_put(tree, NamedSharding(mesh, PartitionSpec()))

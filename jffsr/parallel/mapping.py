@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextvars import ContextVar
 from functools import partial
 from typing import Any
 
@@ -50,7 +51,12 @@ def map_batch(
 
 
 def evaluate(function: Callable[[Any], Any], batch: Any) -> Any:
-    """The same inside a compiled program, every device getting all of the results (K, ...), which should be small."""
+    """The same inside a compiled program, every device getting all of the results (K, ...), which should be small.
+
+    One candidate, and a batch within a function that is itself spread over a batch, are only vectorized.
+    """
+    if _within.get() or batch_size(batch) == 1:
+        return jax.vmap(function)(batch)
     return spread(function, batch, together=True)
 
 
@@ -83,12 +89,28 @@ def spread(
     return _cut(sharded(_padded(batch, each * devices)), count)
 
 
+_within: ContextVar[bool] = ContextVar("within a spread function", default=False)
+
+
+def _marked(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """The function, knowing while it is traced that it is spread."""
+
+    def marked(item: Any) -> Any:
+        token = _within.set(True)
+        try:
+            return function(item)
+        finally:
+            _within.reset(token)
+
+    return marked
+
+
 _spread_jit = jit(lambda f, b, c, m: spread(f, b, chunk=c, memory=m), static_argnums=(0, 2, 3))
 
 
 def _in_chunks(function: Callable[[Any], Any], batch: Any, chunk: int | None, memory: int | None) -> Any:
     """The function over a batch on one device."""
-    count = batch_size(batch)
+    count, function = batch_size(batch), _marked(function)
     if chunk is None and memory is None and count <= LANES:
         return jax.vmap(function)(batch)
     if chunk is not None and chunk >= count:
