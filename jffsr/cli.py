@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from jffsr.errors import InputError
+
+if TYPE_CHECKING:
+    from jffsr.study.planning import Run
 
 MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -75,6 +80,13 @@ def _parser() -> argparse.ArgumentParser:
         help="the run folder; an existing one of the same configuration is gone on with "
         "(default: the first free of runs/NAME, runs/NAME-2, ...)",
     )
+    together = run.add_argument_group(
+        "several processes",
+        "Start the same command once for each process, on one machine or many; a search is spread over all of them.",
+    )
+    together.add_argument("--coordinator", metavar="HOST:PORT", help="where the first process listens")
+    together.add_argument("--processes", metavar="N", type=int, help="how many there are")
+    together.add_argument("--process", metavar="I", type=int, help="which one this is, from 0")
     run.set_defaults(command=_run)
 
     check = commands.add_parser(
@@ -118,17 +130,20 @@ def _run(arguments: argparse.Namespace) -> int:
 
     config = load_config(arguments.config, arguments.overrides)
     _prepare_jax(config.precision)
+    first = _use_all_devices(arguments)
     from jffsr.study.planning import run_planning
     from jffsr.study.summary import summary_text
 
-    run = run_planning(config, arguments.out, say=print)
+    run = run_planning(config, arguments.out, say=print if first else lambda text: None)
+    if not first:
+        return _status(run)
     if run.interrupted:
         path = run.folder.path
         print(
             f"interrupted; '{path}' has the checkpoint, and the same command with --out {path} goes on from it",
             file=sys.stderr,
         )
-        return INTERRUPTED
+        return _status(run)
     if run.already_finished:
         print(f"{run.folder.path} is finished:\n")
     elif config.output.figures:
@@ -137,7 +152,29 @@ def _run(arguments: argparse.Namespace) -> int:
         draw_run(run.folder.path)
     print(summary_text(run.summary))
     print(f"  folder        {run.folder.path}")
+    return _status(run)
+
+
+def _status(run: Run) -> int:
+    if run.interrupted:
+        return INTERRUPTED
     return MET if run.summary["result"]["code"] == 0 else NOT_MET
+
+
+def _use_all_devices(arguments: argparse.Namespace) -> bool:
+    """Take all cores, and join the other processes where there are any; whether this one writes and prints."""
+    from jffsr.parallel.cores import use_all_cores
+
+    # Called from a program that has used JAX before, the program has chosen.
+    with contextlib.suppress(InputError):
+        use_all_cores()
+    given = {name: getattr(arguments, name) for name in ("coordinator", "processes", "process")}
+    if "JAX_COORDINATOR_ADDRESS" not in os.environ and all(value is None for value in given.values()):
+        return True
+    from jffsr.parallel.processes import is_first, join_processes
+
+    join_processes(**given)
+    return is_first()
 
 
 def _check(arguments: argparse.Namespace) -> int:

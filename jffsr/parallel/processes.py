@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import jax
 import numpy as np
 
 from jffsr.errors import InputError
+
+# s. A process that has gone takes the others with it, so that all can be started again from the checkpoint.
+_TIMEOUTS = {"initialization_timeout": 120, "heartbeat_timeout_seconds": 30, "shutdown_timeout_seconds": 30}
 
 
 def join_processes(
@@ -18,7 +23,7 @@ def join_processes(
     """
     jax.config.update("jax_cpu_collectives_implementation", "gloo")
     try:
-        jax.distributed.initialize(coordinator, processes, process, initialization_timeout=120)
+        jax.distributed.initialize(coordinator, processes, process, **_TIMEOUTS)
     except (RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise InputError(f"the processes cannot be joined: {reason}") from None
@@ -38,6 +43,25 @@ def from_first(data: bytes) -> bytes:
     length = int(broadcast_one_to_all(np.array(len(data))))
     mine = np.frombuffer(data.ljust(length, b"\0")[:length], dtype=np.uint8)
     return np.asarray(broadcast_one_to_all(mine)).astype(np.uint8).tobytes()
+
+
+def first_does(action: Callable[[], bytes]) -> bytes:
+    """What the action returns in the first process, where alone it is done, in every process.
+
+    An InputError that it raises is raised in every process. All of them have to call it.
+    """
+    if jax.process_count() == 1:
+        return action()
+    message = b""
+    if is_first():
+        try:
+            message = b"+" + action()
+        except InputError as error:
+            message = b"-" + str(error).encode()
+    message = from_first(message)
+    if message[:1] == b"-":
+        raise InputError(message[1:].decode())
+    return message[1:]
 
 
 def any_process(flag: bool) -> bool:

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.parallel.processes import from_first, is_first
+from jffsr.parallel.processes import first_does, is_first
 from jffsr.writing import write_atomically
 
 _FORMAT = 1
@@ -40,10 +40,7 @@ def load_plans(path: Path, mark: str, blank: Any) -> Any | None:
 
     Raises InputError where the file is damaged or of other problems.
     """
-    try:
-        data = from_first(path.read_bytes() if is_first() and path.is_file() else b"")
-    except OSError as error:
-        raise InputError(f"{path}: the checkpoint cannot be read ({error.strerror or error})") from None
+    data = first_does(lambda: _read(path))
     if not data:
         return None
     try:
@@ -59,3 +56,12 @@ def load_plans(path: Path, mark: str, blank: Any) -> Any | None:
     if not same or any(leaf.shape[1:] != blank.shape[1:] for leaf, blank in zip(leaves, shapes, strict=True)):
         raise InputError(f"{path}: the checkpoint is of other problems; give another file or delete it")
     return structure.unflatten(leaves)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b""
+    except OSError as error:
+        raise InputError(f"{path}: the checkpoint cannot be read ({error.strerror or error})") from None

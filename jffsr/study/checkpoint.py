@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -12,15 +13,18 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.optimizers.driver import Phase, Record, Snapshot, blank_state
 from jffsr.optimizers.interface import OptimizationProblem
-from jffsr.study.atomic import write_atomically
+from jffsr.parallel.processes import first_does, is_first
 from jffsr.types import Array
+from jffsr.writing import write_atomically
 
 _FORMAT = 1
 
 
 def save_checkpoint(path: Path, snapshot: Snapshot) -> None:
-    """Write the snapshot atomically."""
+    """Write the snapshot atomically; of several processes the first does, but all have to call it."""
     leaves = [_to_numpy(leaf) for leaf in jax.tree.leaves(snapshot.state)]
+    if not is_first():
+        return
     head = {"format": _FORMAT, "phase": snapshot.phase, "leaves": len(leaves)}
 
     def write(part: Path) -> None:
@@ -38,8 +42,7 @@ def save_checkpoint(path: Path, snapshot: Snapshot) -> None:
 def load_checkpoint(path: Path, phases: list[Phase], problem: OptimizationProblem, key: Array) -> Snapshot:
     """Read a snapshot of these phases; InputError where the file is damaged or of another search."""
     try:
-        # Opened here, because NumPy leaves a damaged file open.
-        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as file:
+        with np.load(io.BytesIO(first_does(path.read_bytes)), allow_pickle=False) as file:
             head = json.loads(file["head"].tobytes())
             history = file["history"]
             leaves = [file[f"leaf{i}"] for i in range(head["leaves"])]

@@ -9,7 +9,7 @@ import numpy as np
 
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
 from jffsr.planning.plan import Plan
-from jffsr.study.atomic import write_atomically
+from jffsr.writing import write_atomically
 
 _SECOND = {"revolute": "rad", "prismatic": "m"}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import jax
 from jffsr.errors import InputError
 from jffsr.optimizers.driver import Snapshot
 from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.parallel.processes import any_process, first_does, is_first
 from jffsr.planning.plan import Plan, SearchInterrupted, solve
 from jffsr.planning.problem import Problem
 from jffsr.study.atomic import write_json
@@ -81,43 +83,68 @@ def run_planning(
 ) -> Run:
     """Run a planning study in its folder, going on from a checkpoint if there is one.
 
-    The problem is built, and so the input checked, before the folder is touched.
+    The problem is built, and so the input checked, before the folder is touched. Of several processes that compute
+    together only the first touches it.
     """
     problem = build_problem(config)
-    folder = claim_run_folder(config, out)
-    if folder.finished:
-        return Run(folder, folder.read_summary(), already_finished=True)
+    folder, finished, begun = _claim(config, out)
+    if finished:
+        return Run(folder, _summary(folder), already_finished=True)
     kind, settings = build_settings(config)
     phases = build_phases(kind, settings)
     resume = None
-    if folder.checkpoint.is_file():
+    if begun:
         resume = load_checkpoint(folder.checkpoint, phases, problem, jax.random.key(config.seed))
         say(f"going on from {folder.checkpoint} ({resume.history[-1].evaluations} evaluations done)")
-    done = resume.history[-1] if resume else None
-    folder.keep_metrics(done.evaluations if done else 0, done.gradient_evaluations if done else 0)
-    show, close = progress_bar(phases, config.output.progress)
+    if is_first():
+        done = resume.history[-1] if resume else None
+        folder.keep_metrics(done.evaluations if done else 0, done.gradient_evaluations if done else 0)
+    show, close = progress_bar(phases, config.output.progress and is_first())
 
     def on_chunk(snapshot: Snapshot) -> None:
         last = snapshot.history[-1]
-        folder.add_metrics(
-            phase=phases[snapshot.phase].name,
-            iteration=last.iteration,
-            evaluations=last.evaluations,
-            gradient_evaluations=last.gradient_evaluations,
-            best_value=last.best_value,
-        )
+        if is_first():
+            folder.add_metrics(
+                phase=phases[snapshot.phase].name,
+                iteration=last.iteration,
+                evaluations=last.evaluations,
+                gradient_evaluations=last.gradient_evaluations,
+                best_value=last.best_value,
+            )
         save_checkpoint(folder.checkpoint, snapshot)
         show(snapshot)
 
     with Interrupt() as interrupted:
         try:
-            found = _solve(config, problem, resume=resume, on_chunk=on_chunk, interrupted=interrupted)
+            found = _solve(
+                config,
+                problem,
+                resume=resume,
+                on_chunk=on_chunk,
+                interrupted=lambda: any_process(interrupted()),
+            )
         except SearchInterrupted:
             return Run(folder, None, interrupted=True)
         finally:
             close()
-    _finish(folder, config, found, [phase.name for phase in phases])
-    return Run(folder, folder.read_summary())
+    if is_first():
+        _finish(folder, config, found, [phase.name for phase in phases])
+    return Run(folder, _summary(folder))
+
+
+def _claim(config: PlanningConfig, out: str | Path | None) -> tuple[RunFolder, bool, bool]:
+    """The folder of the run, whether the run is finished, and whether it is begun."""
+
+    def claim() -> bytes:
+        folder = claim_run_folder(config, out)
+        return json.dumps([str(folder.path), folder.finished, folder.checkpoint.is_file()]).encode()
+
+    path, finished, begun = json.loads(first_does(claim))
+    return RunFolder(Path(path)), finished, begun
+
+
+def _summary(folder: RunFolder) -> dict[str, Any]:
+    return json.loads(first_does(lambda: json.dumps(folder.read_summary()).encode()))
 
 
 def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str]) -> None:
