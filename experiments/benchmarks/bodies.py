@@ -33,8 +33,8 @@ def turned_bodies(robot) -> Bodies:
     assert robot.topology.is_revolute.all(), "the native opponents know turning joints only"
     turn = [np.eye(3), *(_z_along(np.asarray(axis, float)) for axis in robot.joint_axis)]
     parents = robot.topology.parents
-    rotation = [turn[p].T @ np.asarray(r, float) @ turn[i + 1] for i, (p, r) in enumerate(_placed(robot))]
-    offset = [turn[p].T @ np.asarray(x, float) for p, x in zip(parents, robot.joint_position, strict=True)]
+    rotation = [turn[p].T @ np.asarray(robot.joint_rotation[i], float) @ turn[i + 1] for i, p in enumerate(parents)]
+    offset = [turn[p].T @ np.asarray(robot.joint_position[i], float) for i, p in enumerate(parents)]
     com = [np.zeros(3), *(turn[i + 1].T @ np.asarray(c, float) for i, c in enumerate(robot.link_com))]
     inertia = [a.T @ np.asarray(tensor, float) @ a for a, tensor in zip(turn, robot.inertia, strict=True)]
     return Bodies(
@@ -45,10 +45,6 @@ def turned_bodies(robot) -> Bodies:
         com=np.array(com),
         inertia=np.array(inertia),
     )
-
-
-def _placed(robot):
-    return zip(robot.topology.parents, robot.joint_rotation, strict=True)
 
 
 def _z_along(axis: np.ndarray) -> np.ndarray:

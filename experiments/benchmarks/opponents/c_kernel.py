@@ -18,34 +18,30 @@ NOTE = "the same arithmetic, batch in the vector lanes, g++ -O3 -march=native"
 def rollouts(case: Case, threads: int) -> Program:
     """Final base quaternions (batch, 4)."""
     code, seconds = _library(case)
-    table, joints = law_table(case), law_joints(case)
-    system, keep = _system(case, joints)
+    system, law = _System(case), law_table(case)
     free, out = np.ascontiguousarray(case.free), np.empty((case.batch, 4))
 
     def run():
         code.rollouts(
-            *system, pointer(table), ctypes.c_double(case.step), case.steps, pointer(free), case.batch,
+            *system.arguments(), pointer(law), ctypes.c_double(case.step), case.steps, pointer(free), case.batch,
             pointer(out), threads,
         )  # fmt: skip
         return out
 
-    return Program(run, seconds, keep=keep)
+    return Program(run, seconds)
 
 
 def twists(case: Case, threads: int) -> Program:
     """Base twists (batch, 6) of single evaluations."""
     code, seconds = _library(case)
-    system, keep = _system(case, law_joints(case))
-    position, rate, attitude = (np.ascontiguousarray(x) for x in case.postures)
-    out = np.empty((case.batch, 6))
+    system, out = _System(case), np.empty((case.batch, 6))
+    inputs = [np.ascontiguousarray(x) for x in case.postures]
 
     def run():
-        code.twists(
-            *system, pointer(position), pointer(rate), pointer(attitude), case.batch, pointer(out), threads
-        )
+        code.twists(*system.arguments(), *map(pointer, inputs), case.batch, pointer(out), threads)
         return out
 
-    return Program(run, seconds, keep=keep)
+    return Program(run, seconds)
 
 
 def operations(case: Case) -> int:
@@ -62,21 +58,28 @@ def _library(case: Case):
     return library("kernel.cpp", f"-DJOINTS={len(parents)}", f"-DPARENTS={{{','.join(map(str, parents))}}}")
 
 
-def _system(case: Case, joints: np.ndarray):
-    """The leading arguments of the kernel, and the arrays that must outlive them."""
-    bodies = turned_bodies(case.robot)
-    carried = bodies.mass.copy()
-    for i in reversed(range(len(bodies.parents))):
-        carried[bodies.parents[i]] += carried[i + 1]
-    rows = []
-    for i in range(len(bodies.parents)):
-        mass, com = bodies.mass[i + 1], bodies.com[i + 1]
-        about_joint = bodies.inertia[i + 1] + mass * (com @ com * np.eye(3) - np.outer(com, com))
-        numbers = (mass, carried[i + 1], mass * com, _elements(about_joint), bodies.rotation[i], bodies.offset[i])
-        rows.append(np.concatenate([np.ravel(x) for x in numbers]))
-    table, base = np.ascontiguousarray(rows), np.ascontiguousarray(_elements(bodies.inertia[0]))
-    leading = (pointer(table), pointer(joints), pointer(base), ctypes.c_double(float(bodies.mass.sum())))
-    return leading, (table, joints, base)
+class _System:
+    """The kernel's leading arguments, and the arrays behind them."""
+
+    def __init__(self, case: Case):
+        bodies = turned_bodies(case.robot)
+        carried = bodies.mass.copy()
+        for i in reversed(range(len(bodies.parents))):
+            carried[bodies.parents[i]] += carried[i + 1]
+        rows = []
+        for i in range(len(bodies.parents)):
+            mass, com = bodies.mass[i + 1], bodies.com[i + 1]
+            about_joint = bodies.inertia[i + 1] + mass * (com @ com * np.eye(3) - np.outer(com, com))
+            numbers = (mass, carried[i + 1], mass * com, _elements(about_joint))
+            rows.append(np.concatenate([np.ravel(x) for x in (*numbers, bodies.rotation[i], bodies.offset[i])]))
+        self.bodies = np.ascontiguousarray(rows)
+        self.joints = law_joints(case)
+        self.base = _elements(bodies.inertia[0])
+        self.mass = float(bodies.mass.sum())
+
+    def arguments(self):
+        """Body table, joint table, elements of the base's inertia, total mass."""
+        return pointer(self.bodies), pointer(self.joints), pointer(self.base), ctypes.c_double(self.mass)
 
 
 def _elements(matrix: np.ndarray) -> np.ndarray:

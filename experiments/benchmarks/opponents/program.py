@@ -16,14 +16,12 @@ class Unsupported(Exception):
 class Program:
     """run() does the whole work and returns when it is done; batch is that of the case unless it says another.
 
-    A smaller batch is for what would take too long: its time is given per rollout, and marked. keep holds what
-    must live as long as the program.
+    A smaller batch is for what would take too long: its time is given per rollout, and marked.
     """
 
     run: Callable[[], Any]
     compile_seconds: float
     batch: int | None = None
-    keep: Any = None
 
 
 def compiled(function: Callable, *arguments, batch: int | None = None) -> Program:
@@ -36,4 +34,4 @@ def compiled(function: Callable, *arguments, batch: int | None = None) -> Progra
     started = time.perf_counter()
     program = jit(function).lower(*placed).compile()
     seconds = time.perf_counter() - started
-    return Program(lambda: jax.block_until_ready(program(*placed)), seconds, batch, keep=placed)
+    return Program(lambda: jax.block_until_ready(program(*placed)), seconds, batch)

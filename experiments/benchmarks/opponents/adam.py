@@ -1,0 +1,44 @@
+"""adam: base twist from its mass matrix in every stage of the obvious rollout."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jffsr
+from experiments.benchmarks.cases import Case
+from experiments.benchmarks.opponents import integrate
+
+NAME = "adam"
+NOTE = "`mass_matrix` of each stage, a 6 x 6 solve, vmap"
+
+
+def twist(case: Case):
+    """Base twist from the blocks of the mass matrix."""
+    import adam
+    from adam.jax import KinDynComputations
+
+    model = KinDynComputations(jffsr.to_urdf(case.robot), list(case.robot.joint_names), dtype=case.dtype)
+    model.set_frame_velocity_representation(adam.Representations.BODY_FIXED_REPRESENTATION)
+
+    def of(q, qd, quaternion):
+        turn = integrate.rotation_matrix(quaternion / jnp.linalg.norm(quaternion))
+        mass = model.mass_matrix(jnp.eye(4, dtype=q.dtype).at[:3, :3].set(turn), q)
+        velocity = -jnp.linalg.solve(mass[:6, :6], mass[:6, 6:] @ qd)
+        omega = turn @ velocity[3:]
+        # The linear part is that of the root link's origin.
+        lever = -turn @ np.asarray(case.robot.root_position)
+        return jnp.concatenate([turn @ velocity[:3] + jnp.cross(omega, lever), omega])
+
+    return of
+
+
+def final_attitude(case: Case):
+    """See `integrate.final_attitude`."""
+    return integrate.final_attitude(case, twist(case))
+
+
+def batched(function):
+    """One vmap."""
+    return jax.vmap(function)
