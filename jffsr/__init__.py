@@ -45,6 +45,8 @@ _HOME = {
     "reference_rollout": "jffsr.rollouts.reference",
     "DrivenMotion": "jffsr.rollouts.torque_driven",
     "torque_rollout": "jffsr.rollouts.torque_driven",
+    "map_batch": "jffsr.parallel.mapping",
+    "use_all_cores": "jffsr.parallel.cores",
     "crosscheck_many": "jffsr.crosscheck.mjx_batch",
     "CompositeIndex": "jffsr.objectives.composite",
     "minimize": "jffsr.optimizers.minimize",

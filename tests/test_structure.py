@@ -21,6 +21,7 @@ ORDER = [
     "reading",
     "types",
     "compiling",
+    "parallel",
     "spatial",
     "robots",
     "dynamics",

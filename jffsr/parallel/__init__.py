@@ -1,0 +1,1 @@
+"""Many candidates at once: in chunks that fit the memory, over cores, devices and processes. Knows no robots."""
