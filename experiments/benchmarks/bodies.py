@@ -33,7 +33,9 @@ def turned_bodies(robot) -> Bodies:
     assert robot.topology.is_revolute.all(), "the native opponents know turning joints only"
     turn = [np.eye(3), *(_z_along(np.asarray(axis, float)) for axis in robot.joint_axis)]
     parents = robot.topology.parents
-    rotation = [turn[p].T @ np.asarray(robot.joint_rotation[i], float) @ turn[i + 1] for i, p in enumerate(parents)]
+    rotation = [
+        turn[p].T @ np.asarray(robot.joint_rotation[i], float) @ turn[i + 1] for i, p in enumerate(parents)
+    ]
     offset = [turn[p].T @ np.asarray(robot.joint_position[i], float) for i, p in enumerate(parents)]
     com = [np.zeros(3), *(turn[i + 1].T @ np.asarray(c, float) for i, c in enumerate(robot.link_com))]
     inertia = [a.T @ np.asarray(tensor, float) @ a for a, tensor in zip(turn, robot.inertia, strict=True)]

@@ -53,5 +53,6 @@ def first_error(output: str) -> str:
 
 def pointer(array: np.ndarray) -> ctypes.c_void_p:
     """The address of a contiguous float64 array."""
-    assert array.dtype == np.float64 and array.flags.c_contiguous
+    assert array.dtype == np.float64
+    assert array.flags.c_contiguous
     return ctypes.c_void_p(array.ctypes.data)

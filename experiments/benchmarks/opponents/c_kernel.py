@@ -71,7 +71,9 @@ class _System:
             mass, com = bodies.mass[i + 1], bodies.com[i + 1]
             about_joint = bodies.inertia[i + 1] + mass * (com @ com * np.eye(3) - np.outer(com, com))
             numbers = (mass, carried[i + 1], mass * com, _elements(about_joint))
-            rows.append(np.concatenate([np.ravel(x) for x in (*numbers, bodies.rotation[i], bodies.offset[i])]))
+            rows.append(
+                np.concatenate([np.ravel(x) for x in (*numbers, bodies.rotation[i], bodies.offset[i])])
+            )
         self.bodies = np.ascontiguousarray(rows)
         self.joints = law_joints(case)
         self.base = _elements(bodies.inertia[0])

@@ -12,6 +12,7 @@ from jffsr.spatial.components import add, cross
 
 NAME = "jffsr"
 NOTE = "`jffsr.rollout` through `jffsr.map_batch`"
+IN_CHUNKS = True
 
 
 def final_attitude(case: Case):
@@ -19,7 +20,9 @@ def final_attitude(case: Case):
 
     def of(free):
         trajectory = case.trajectory.with_free(free)
-        return jffsr.rollout(case.robot, trajectory, initial_state(), num_steps=case.steps).base_quaternion[-1]
+        return jffsr.rollout(case.robot, trajectory, initial_state(), num_steps=case.steps).base_quaternion[
+            -1
+        ]
 
     return of
 

@@ -20,7 +20,12 @@ def twist(case: Case) -> Twist:
     def of(q, qd, quaternion):
         rotations, origins = [rotation_matrix(quaternion)], [jnp.zeros(3)]
         # Position, velocity and angular velocity of every body with the base held.
-        velocities, spins, coms, com_velocities = [jnp.zeros(3)], [jnp.zeros(3)], [jnp.zeros(3)], [jnp.zeros(3)]
+        velocities, spins, coms, com_velocities = (
+            [jnp.zeros(3)],
+            [jnp.zeros(3)],
+            [jnp.zeros(3)],
+            [jnp.zeros(3)],
+        )
         for i, parent in enumerate(parents):
             arm = rotations[parent] @ robot.joint_position[i]
             placed = rotations[parent] @ robot.joint_rotation[i]
@@ -38,7 +43,9 @@ def twist(case: Case) -> Twist:
         centre, drift = mass @ com / mass.sum(), mass @ com_velocity / mass.sum()
         inertia = rotation @ robot.inertia @ jnp.swapaxes(rotation, -1, -2)
         lever = com - centre
-        square = jnp.sum(lever**2, axis=-1)[:, None, None] * jnp.eye(3) - lever[:, :, None] * lever[:, None, :]
+        square = (
+            jnp.sum(lever**2, axis=-1)[:, None, None] * jnp.eye(3) - lever[:, :, None] * lever[:, None, :]
+        )
         locked = jnp.sum(inertia + mass[:, None, None] * square, axis=0)
         momentum = jnp.sum(
             jnp.einsum("bij,bj->bi", inertia, jnp.stack(spins))

@@ -15,7 +15,7 @@ LARGEST_BATCH = 8
 
 def rollouts(case: Case, threads: int) -> Program:
     """Final base quaternions of the first few candidates."""
-    base_rate, n = _base_twist(case), case.robot.num_joints
+    base_twist, n = _base_twist(case), case.robot.num_joints
     law, joints, step = law_table(case), law_joints(case), case.step
     batch = min(case.batch, LARGEST_BATCH)
 
@@ -28,11 +28,9 @@ def rollouts(case: Case, threads: int) -> Program:
             rate = joints[:, 3] * row[1] + row[3] * shape + row[5] * beta
             q = joints[:, 0] + joints[:, 1] * np.sin(argument)
             qd = joints[:, 1] * np.cos(argument) * rate
-            wx, wy, wz = base_rate(q, qd, x / np.sqrt(x @ x))[3:]
-            w, a, b, c = x
-            return 0.5 * np.array(
-                [-a * wx - b * wy - c * wz, w * wx + b * wz - c * wy, w * wy + c * wx - a * wz, w * wz + a * wy - b * wx]
-            )
+            omega = base_twist(q, qd, x / np.sqrt(x @ x))[3:]
+            w, v = x[0], x[1:]
+            return 0.5 * np.concatenate([[-(v @ omega)], w * omega + np.cross(v, omega)])
 
         x = np.array([1.0, 0.0, 0.0, 0.0])
         for i in range(case.steps):

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from experiments.benchmarks.cases import FLOAT64
+from experiments.benchmarks.precision import precision
+
 
 class Unsupported(Exception):
     """An opponent that is installed but has no such path; the sentence says why."""
@@ -24,14 +27,43 @@ class Program:
     batch: int | None = None
 
 
-def compiled(function: Callable, *arguments, batch: int | None = None) -> Program:
+def compiled(
+    function: Callable, *arguments, batch: int | None = None, precision_name: str = FLOAT64
+) -> Program:
     """A JAX function lowered and compiled for these arguments, which are put on the device first."""
     import jax
 
     from jffsr.compiling import jit
 
-    placed = jax.block_until_ready(jax.device_put(arguments))
-    started = time.perf_counter()
-    program = jit(function).lower(*placed).compile()
-    seconds = time.perf_counter() - started
-    return Program(lambda: jax.block_until_ready(program(*placed)), seconds, batch)
+    with precision(precision_name):
+        placed = jax.block_until_ready(jax.device_put(arguments))
+        started = time.perf_counter()
+        program = jit(function).lower(*placed).compile()
+        seconds = time.perf_counter() - started
+
+    def run():
+        with precision(precision_name):
+            return jax.block_until_ready(program(*placed))
+
+    return Program(run, seconds, batch)
+
+
+def called(
+    function: Callable, *arguments, batch: int | None = None, precision_name: str = FLOAT64
+) -> Program:
+    """A function that compiles by itself when it is first called: the first call less the second is compiling."""
+    import jax
+
+    with precision(precision_name):
+        placed = jax.block_until_ready(jax.device_put(arguments))
+
+    def run():
+        with precision(precision_name):
+            return jax.block_until_ready(function(*placed))
+
+    seconds = []
+    for _ in range(2):
+        started = time.perf_counter()
+        run()
+        seconds.append(time.perf_counter() - started)
+    return Program(run, max(0.0, seconds[0] - seconds[1]), batch)
