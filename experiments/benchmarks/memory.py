@@ -10,8 +10,8 @@ import jax
 import numpy as np
 
 import jffsr
-from experiments.benchmarks.planning_work import problem_of
 from experiments.benchmarks.jobs import REFERENCE
+from experiments.benchmarks.planning_work import problem_of
 
 
 def main() -> None:

@@ -121,12 +121,8 @@ def _axis(rows, axis) -> str:
         return ""
     values = sorted({row[axis] for row in found}, key=_order)
     names = [name for name in r.OPPONENTS if any(row["opponent"] == name and row["axis"] for row in found)]
-    lines = [
-        "| "
-        + " | ".join([f"by {axis}", *(JOINTS.get(v, f"{v:,}" if isinstance(v, int) else v) for v in values)])
-        + " |",
-        "|---" * (len(values) + 1) + "|",
-    ]
+    words = [JOINTS.get(value, f"{value:,}" if isinstance(value, int) else value) for value in values]
+    lines = ["| " + " | ".join([f"by {axis}", *words]) + " |", "|---" * (len(values) + 1) + "|"]
     for name in names:
         cells = []
         for value in values:

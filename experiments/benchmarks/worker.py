@@ -98,11 +98,9 @@ def reason(error: Exception) -> str:
     text = " ".join(str(error).split())
     if isinstance(error, Unsupported):
         return text
-    return (
-        f"not installed: {text}"
-        if isinstance(error, ImportError)
-        else f"failed: {type(error).__name__}: {text[:200]}"
-    )
+    if isinstance(error, ImportError):
+        return f"not installed: {text}"
+    return f"failed: {type(error).__name__}: {text[:200]}"
 
 
 def say(text: str) -> None:
