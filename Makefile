@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics bench lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-native bench lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -43,6 +43,9 @@ check-slow: $(STAMP)  ## run the heavier checks
 check-physics: $(STAMP)  ## check 1,000 random robots against MuJoCo and the laws of mechanics
 	$(VENV_PYTHON) tests/physics/check_physics.py
 	$(PYTEST) -m physics $(PYTEST_ARGS)
+
+check-native: $(STAMP)  ## check the benchmark's C++ kernel against the package (needs a C++ compiler)
+	$(PYTEST) -m native $(PYTEST_ARGS)
 
 bench:  ## time rollouts against everything else that computes them (QUICK=1: some of it)
 	@$(MAKE) --no-print-directory venv VENV="$(BENCH_VENV)"

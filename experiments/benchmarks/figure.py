@@ -32,7 +32,9 @@ def draw(rows: list[dict], path: Path) -> None:
     _bars(axes[0], measured)
     _lines(axes[1], measured, "batch", "rollouts at once")
     _lines(axes[2], measured, "steps", "steps")
-    axes[2].legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    lines, names = axes[1].get_legend_handles_labels()
+    if lines:
+        axes[2].legend(lines, names, frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     figure.savefig(path, dpi=130)
     plt.close(figure)
 

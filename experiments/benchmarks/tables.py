@@ -14,6 +14,7 @@ def report(rows: list[dict]) -> str:
     """Everything between the marks of the page."""
     parts = [
         _machine(rows),
+        "\n".join(f"* **{opponent.name}**: {opponent.note}." for opponent in r.OPPONENTS.values()),
         "### Targets\n\nSeven joints, 200 steps, batch 1,024, float64, medians of one run, unless said otherwise.",
         _targets(rows),
         "### One rollout, one core\n\nSeven joints, 200 steps, batch 1,024, float64. "

@@ -10,9 +10,6 @@ import jffsr
 from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents import integrate
 
-NAME = "adam"
-NOTE = "`mass_matrix` of each stage, a 6 x 6 solve, vmap"
-
 
 def twist(case: Case):
     """Base twist from the blocks of the mass matrix."""

@@ -11,9 +11,6 @@ from experiments.benchmarks.cases import FLOAT64, Case
 from experiments.benchmarks.native.build import library, pointer
 from experiments.benchmarks.opponents.program import Program, Unsupported
 
-NAME = "vectorised C++ kernel"
-NOTE = "the same arithmetic, batch in the vector lanes, g++ -O3 -march=native"
-
 
 def rollouts(case: Case, threads: int) -> Program:
     """Final base quaternions (batch, 4)."""

@@ -14,9 +14,6 @@ from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents import obvious_jax
 from experiments.benchmarks.opponents.integrate import quaternion_rate
 
-NAME = "diffrax"
-NOTE = "classical RK4 as a tableau, constant steps, right-hand side of the obvious JAX, vmap"
-
 
 def final_attitude(case: Case):
     """A function of one candidate (2n,): the final base quaternion (4,)."""

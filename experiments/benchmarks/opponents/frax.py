@@ -14,9 +14,6 @@ import jffsr
 from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents import integrate
 
-NAME = "frax"
-NOTE = "`mass_matrix` of each stage, a 6 x 6 solve, vmap"
-
 
 def twist(case: Case):
     """Base twist from the blocks of the mass matrix."""

@@ -10,8 +10,6 @@ from experiments.benchmarks.opponents.integrate import rotation_matrix
 from jffsr.rollouts.joint_terms import joint_terms
 from jffsr.spatial.components import add, cross
 
-NAME = "jffsr"
-NOTE = "`jffsr.rollout` through `jffsr.map_batch`"
 IN_CHUNKS = True
 
 

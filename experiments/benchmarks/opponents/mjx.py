@@ -11,9 +11,6 @@ from experiments.benchmarks.opponents import integrate
 from jffsr.crosscheck.mujoco_model import branch_order, to_mjmodel
 from jffsr.crosscheck.quiet import import_mjx
 
-NAME = "MJX"
-NOTE = "kinematics, com_pos, crb and full_m of each stage, a 6 x 6 solve, vmap"
-
 
 def twist(case: Case):
     """Base twist from the blocks of MuJoCo's mass matrix."""

@@ -8,9 +8,6 @@ import jax.numpy as jnp
 from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents.integrate import Twist, rotation_matrix
 
-NAME = "obvious JAX"
-NOTE = "all in the scan, 3-vectors, stages unrolled, a 3 x 3 solve each, vmap"
-
 
 def twist(case: Case) -> Twist:
     """Base twist by sums over the bodies."""

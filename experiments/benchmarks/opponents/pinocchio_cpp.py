@@ -13,9 +13,6 @@ from experiments.benchmarks.cases import FLOAT64, Case
 from experiments.benchmarks.native.build import library, pointer
 from experiments.benchmarks.opponents.program import Program, Unsupported
 
-NAME = "Pinocchio C++"
-NOTE = "base twist from crba, four evaluations a step, joints about z, g++ -O3 -march=native"
-
 MASS_MATRIX, CENTROIDAL = 0, 1
 
 

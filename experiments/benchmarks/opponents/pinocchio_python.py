@@ -8,8 +8,6 @@ from experiments.benchmarks.bodies import law_joints, law_table, turned_bodies
 from experiments.benchmarks.cases import FLOAT64, Case
 from experiments.benchmarks.opponents.program import Program, Unsupported
 
-NAME = "Pinocchio Python"
-NOTE = "`crba` from Python, NumPy around it, a rollout at a time on one core"
 LARGEST_BATCH = 8
 
 

@@ -8,9 +8,6 @@ import numpy as np
 import jffsr
 from experiments.benchmarks.cases import Case, initial_state
 
-NAME = "plain path"
-NOTE = "`jffsr.reference_rollout`, vmap"
-
 
 def final_attitude(case: Case):
     """A function of one candidate (2n,): the final base quaternion (4,)."""

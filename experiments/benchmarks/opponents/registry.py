@@ -26,6 +26,7 @@ class Opponent:
 
     name: str
     module: str
+    note: str
     largest: int | None = 409_600
     on_accelerators: bool = True
     options: tuple[tuple[str, object], ...] = ()
@@ -68,16 +69,52 @@ class Opponent:
 OPPONENTS = {
     opponent.name: opponent
     for opponent in (
-        Opponent(FAST, "jffsr_fast", largest=None, own=True),
-        Opponent(PLAIN, "plain_path", own=True),
-        Opponent(OBVIOUS, "obvious_jax", own=True),
-        Opponent(DIFFRAX, "diffrax"),
-        Opponent(MJX, "mjx", largest=51_200),
-        Opponent(FRAX, "frax"),
-        Opponent(ADAM, "adam", largest=102_400),
-        Opponent(PINOCCHIO_PYTHON, "pinocchio_python", on_accelerators=False),
-        Opponent(PINOCCHIO, "pinocchio_cpp", on_accelerators=False),
-        Opponent(SHARED, "pinocchio_cpp", on_accelerators=False, options=(("shared", True),)),
-        Opponent(KERNEL, "c_kernel", largest=None, on_accelerators=False),
+        Opponent(FAST, "jffsr_fast", "`jffsr.rollout` through `jffsr.map_batch`", largest=None, own=True),
+        Opponent(
+            PLAIN, "plain_path", "`jffsr.reference_rollout`: a 6 x 6 solve in each stage; one vmap", own=True
+        ),
+        Opponent(
+            OBVIOUS,
+            "obvious_jax",
+            "everything in the scan, 3-vectors, four stages written out, a 3 x 3 solve in each; one vmap",
+            own=True,
+        ),
+        Opponent(
+            DIFFRAX,
+            "diffrax",
+            "constant steps, classical RK4 as a tableau, obvious right-hand side; one vmap",
+        ),
+        Opponent(
+            MJX, "mjx", "mass matrix (kinematics, com_pos, crb) in each stage; one vmap", largest=51_200
+        ),
+        Opponent(FRAX, "frax", "`mass_matrix` in each stage; one vmap"),
+        Opponent(ADAM, "adam", "`mass_matrix` in each stage; one vmap", largest=102_400),
+        Opponent(
+            PINOCCHIO_PYTHON,
+            "pinocchio_python",
+            "`crba` in each stage, NumPy around it; a rollout at a time",
+            on_accelerators=False,
+        ),
+        Opponent(
+            PINOCCHIO,
+            "pinocchio_cpp",
+            "`crba` in each of the four stages, joints about z, g++ -O3 -march=native; a rollout at a time",
+            on_accelerators=False,
+        ),
+        Opponent(
+            SHARED,
+            "pinocchio_cpp",
+            "the same with two `crba` a step: at zero momentum the rate in the base's frame does not depend on the "
+            "attitude, which whoever writes it has to notice",
+            on_accelerators=False,
+            options=(("shared", True),),
+        ),
+        Opponent(
+            KERNEL,
+            "c_kernel",
+            "the ceiling: jffsr's arithmetic in C++, the batch in the lanes of vector registers",
+            largest=None,
+            on_accelerators=False,
+        ),
     )
 }
