@@ -17,8 +17,11 @@ Twist = Callable[[jax.Array, jax.Array, jax.Array], jax.Array]
 """Joint positions (n,), rates (n,) and base quaternion (4,) to the base twist (6,) in I at zero momentum."""
 
 
-def final_attitude(case: Case, twist: Twist) -> Callable[[jax.Array], jax.Array]:
-    """A function of one candidate (2n,): the final base quaternion (4,)."""
+def final_attitude(case: Case, twist: Twist, looped: bool = False) -> Callable[[jax.Array], jax.Array]:
+    """A function of one candidate (2n,): the final base quaternion (4,).
+
+    looped makes the four stages a loop, for a twist that takes too long to compile four times.
+    """
     step, steps = case.step, case.steps
 
     def of(free):
@@ -27,6 +30,18 @@ def final_attitude(case: Case, twist: Twist) -> Callable[[jax.Array], jax.Array]
         def slope(time, quaternion):
             q, qd, _ = trajectory(time)
             return quaternion_rate(quaternion, twist(q, qd, quaternion)[3:])
+
+        def advance_looped(x, i):
+            def stage(carry, numbers):
+                last, total = carry
+                reach, weight = numbers
+                k = slope((i + reach) * step, x + reach * step * last)
+                return (k, total + weight * k), None
+
+            zero = jnp.zeros_like(x)
+            numbers = (jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6)
+            x = x + step * jax.lax.scan(stage, (zero, zero), numbers)[0][1]
+            return x / jnp.linalg.norm(x), None
 
         def advance(x, i):
             time = i * step
@@ -38,7 +53,9 @@ def final_attitude(case: Case, twist: Twist) -> Callable[[jax.Array], jax.Array]
             return x / jnp.linalg.norm(x), None
 
         start = jnp.zeros(4).at[0].set(1.0)
-        return jax.lax.scan(advance, start, jnp.arange(steps, dtype=start.dtype))[0]
+        return jax.lax.scan(
+            advance_looped if looped else advance, start, jnp.arange(steps, dtype=start.dtype)
+        )[0]
 
     return of
 

@@ -34,7 +34,7 @@ def twist(case: Case):
 
 def final_attitude(case: Case):
     """See `integrate.final_attitude`."""
-    return integrate.final_attitude(case, twist(case))
+    return integrate.final_attitude(case, twist(case), looped=True)
 
 
 def batched(function):

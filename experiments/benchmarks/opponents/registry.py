@@ -85,10 +85,13 @@ OPPONENTS = {
             "constant steps, classical RK4 as a tableau, obvious right-hand side; one vmap",
         ),
         Opponent(
-            MJX, "mjx", "mass matrix (kinematics, com_pos, crb) in each stage; one vmap", largest=51_200
+            MJX,
+            "mjx",
+            "mass matrix (kinematics, com_pos, crb) in each stage, the stages a loop; one vmap",
+            largest=12_800,
         ),
-        Opponent(FRAX, "frax", "`mass_matrix` in each stage; one vmap"),
-        Opponent(ADAM, "adam", "`mass_matrix` in each stage; one vmap", largest=102_400),
+        Opponent(FRAX, "frax", "`mass_matrix` in each stage; one vmap", largest=51_200),
+        Opponent(ADAM, "adam", "`mass_matrix` in each stage; its own batch axis", largest=51_200),
         Opponent(
             PINOCCHIO_PYTHON,
             "pinocchio_python",
