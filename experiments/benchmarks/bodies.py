@@ -5,10 +5,11 @@ Engines are fastest with joints about a coordinate axis, so all opponents that a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+import jffsr
 from experiments.benchmarks.cases import Case
 
 
@@ -47,6 +48,12 @@ def turned_bodies(robot) -> Bodies:
         com=np.array(com),
         inertia=np.array(inertia),
     )
+
+
+def plain_urdf(robot) -> str:
+    """The robot as URDF without limits of acceleration, which are no part of the format and which readers report."""
+    unlimited = np.full(robot.num_joints, np.inf)
+    return jffsr.to_urdf(robot.replace(limits=replace(robot.limits, acceleration=unlimited)))
 
 
 def _z_along(axis: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include <pinocchio/multibody.hpp>
-#include <pinocchio/algorithm/centroidal.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 
 #include "law.hpp"
@@ -15,8 +14,6 @@
 namespace pin = pinocchio;
 
 namespace {
-
-enum Way { MASS_MATRIX = 0, CENTROIDAL = 1 };
 
 struct Robot {
     pin::Model model;
@@ -50,29 +47,18 @@ struct Worker {
     }
 
     // Base twist in the base's frame, at zero momentum.
-    Eigen::Matrix<double, 6, 1> twist(const Eigen::Quaterniond& attitude, Way way) {
+    Eigen::Matrix<double, 6, 1> twist(const Eigen::Quaterniond& attitude) {
         q.segment<4>(3) = attitude.coeffs();
-        if (way == MASS_MATRIX) {
-            pin::crba(robot.model, data, q, pin::Convention::LOCAL);
-            const Eigen::Matrix<double, 6, 6> block = data.M.topLeftCorner<6, 6>().selfadjointView<Eigen::Upper>();
-            const Eigen::Matrix<double, 6, 1> carried = data.M.block(0, 6, 6, robot.count) * v.tail(robot.count);
-            return -block.llt().solve(carried);
-        }
-        // The momentum that the joints carry with the base at rest, and the locked inertia, both about the
-        // system's centre of mass and resolved in I.
-        pin::ccrba(robot.model, data, q, v);
-        const Eigen::Matrix3d turn = attitude.toRotationMatrix();
-        const Eigen::Vector3d omega = -data.Ig.inertia().matrix().llt().solve(data.hg.angular());
-        const Eigen::Vector3d linear = -data.hg.linear() / data.Ig.mass() + data.com[0].cross(omega);
-        Eigen::Matrix<double, 6, 1> result;
-        result << turn.transpose() * linear, turn.transpose() * omega;
-        return result;
+        pin::crba(robot.model, data, q, pin::Convention::LOCAL);
+        const Eigen::Matrix<double, 6, 6> block = data.M.topLeftCorner<6, 6>().selfadjointView<Eigen::Upper>();
+        const Eigen::Matrix<double, 6, 1> carried = data.M.block(0, 6, 6, robot.count) * v.tail(robot.count);
+        return -block.llt().solve(carried);
     }
 
-    Eigen::Vector4d slope(const Eigen::Vector4d& quaternion, Way way) {
+    Eigen::Vector4d slope(const Eigen::Vector4d& quaternion) {
         // A stage's quaternion is not quite of unit length: the base's rotation is made with the unit one.
         const Eigen::Quaterniond now(quaternion);
-        const Eigen::Vector3d omega = twist(now.normalized(), way).tail<3>();
+        const Eigen::Vector3d omega = twist(now.normalized()).tail<3>();
         return 0.5 * (now * Eigen::Quaterniond(0.0, omega[0], omega[1], omega[2])).coeffs();
     }
 
@@ -81,17 +67,17 @@ struct Worker {
     }
 
     // Four evaluations a step, each at the stage's own attitude.
-    Eigen::Vector4d roll(const double* law, double step, int steps, const double* free, Way way) {
+    Eigen::Vector4d roll(const double* law, double step, int steps, const double* free) {
         Eigen::Vector4d x(0.0, 0.0, 0.0, 1.0);
         for (int s = 0; s < steps; ++s) {
             const double* row = law + 2 * s * LAW_COLUMNS;
             at(row, free);
-            const Eigen::Vector4d k1 = slope(x, way);
+            const Eigen::Vector4d k1 = slope(x);
             at(row + LAW_COLUMNS, free);
-            const Eigen::Vector4d k2 = slope(x + 0.5 * step * k1, way);
-            const Eigen::Vector4d k3 = slope(x + 0.5 * step * k2, way);
+            const Eigen::Vector4d k2 = slope(x + 0.5 * step * k1);
+            const Eigen::Vector4d k3 = slope(x + 0.5 * step * k2);
             at(row + 2 * LAW_COLUMNS, free);
-            const Eigen::Vector4d k4 = slope(x + step * k3, way);
+            const Eigen::Vector4d k4 = slope(x + step * k3);
             x += step / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
             x.normalize();
         }
@@ -99,16 +85,16 @@ struct Worker {
     }
 
     // Two evaluations a step: at zero momentum the rate in the base's own frame does not depend on the attitude.
-    Eigen::Vector4d roll_shared(const double* law, double step, int steps, const double* free, Way way) {
+    Eigen::Vector4d roll_shared(const double* law, double step, int steps, const double* free) {
         const Eigen::Quaterniond still = Eigen::Quaterniond::Identity();
         Eigen::Vector4d x(0.0, 0.0, 0.0, 1.0);
         at(law, free);
-        Eigen::Vector3d first = twist(still, way).tail<3>();
+        Eigen::Vector3d first = twist(still).tail<3>();
         for (int s = 0; s < steps; ++s) {
             at(law + (2 * s + 1) * LAW_COLUMNS, free);
-            const Eigen::Vector3d middle = twist(still, way).tail<3>();
+            const Eigen::Vector3d middle = twist(still).tail<3>();
             at(law + (2 * s + 2) * LAW_COLUMNS, free);
-            const Eigen::Vector3d last = twist(still, way).tail<3>();
+            const Eigen::Vector3d last = twist(still).tail<3>();
             const Eigen::Vector4d k1 = spin(x, first), k2 = spin(x + 0.5 * step * k1, middle);
             const Eigen::Vector4d k3 = spin(x + 0.5 * step * k2, middle), k4 = spin(x + step * k3, last);
             x += step / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
@@ -146,14 +132,14 @@ void free_robot(void* robot) { delete static_cast<Robot*>(robot); }
 
 // free (batch, 2n): the alphas, then the betas; attitude (batch, 4) is (w, x, y, z) at the end, from the identity.
 void rollouts(void* handle, const double* law, double step, int steps, const double* free, int batch, double* attitude,
-              int way, int shared, int threads) {
+              int shared, int threads) {
     const Robot& robot = *static_cast<Robot*>(handle);
     split(batch, threads, [&](int begin, int end) {
         Worker worker(robot);
         for (int i = begin; i < end; ++i) {
             const double* numbers = free + static_cast<long>(i) * 2 * robot.count;
-            const Eigen::Vector4d x = shared ? worker.roll_shared(law, step, steps, numbers, Way(way))
-                                             : worker.roll(law, step, steps, numbers, Way(way));
+            const Eigen::Vector4d x = shared ? worker.roll_shared(law, step, steps, numbers)
+                                             : worker.roll(law, step, steps, numbers);
             double* out = attitude + 4l * i;
             out[0] = x[3], out[1] = x[0], out[2] = x[1], out[3] = x[2];
         }
@@ -162,7 +148,7 @@ void rollouts(void* handle, const double* law, double step, int steps, const dou
 
 // angles and rates (batch, n), attitude (batch, 4) as (w, x, y, z), twist (batch, 6) in I.
 void twists(void* handle, const double* angles, const double* rates, const double* attitude, int batch, double* twist,
-            int way, int threads) {
+            int threads) {
     const Robot& robot = *static_cast<Robot*>(handle);
     split(batch, threads, [&](int begin, int end) {
         Worker worker(robot);
@@ -172,7 +158,7 @@ void twists(void* handle, const double* angles, const double* rates, const doubl
             worker.v.tail(n) = Eigen::Map<const Eigen::VectorXd>(rates + n * i, n);
             const double* a = attitude + 4l * i;
             const Eigen::Quaterniond quaternion(a[0], a[1], a[2], a[3]);
-            const Eigen::Matrix<double, 6, 1> body = worker.twist(quaternion, Way(way));
+            const Eigen::Matrix<double, 6, 1> body = worker.twist(quaternion);
             Eigen::Map<Eigen::Vector3d>(twist + 6l * i) = quaternion * body.head<3>();
             Eigen::Map<Eigen::Vector3d>(twist + 6l * i + 3) = quaternion * body.tail<3>();
         }

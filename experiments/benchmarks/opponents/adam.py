@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-import jffsr
+from experiments.benchmarks.bodies import plain_urdf
 from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents import integrate
 
@@ -19,7 +19,7 @@ def twist(case: Case):
     import adam
     from adam.jax import KinDynComputations
 
-    model = KinDynComputations(jffsr.to_urdf(case.robot), list(case.robot.joint_names), dtype=case.dtype)
+    model = KinDynComputations(plain_urdf(case.robot), list(case.robot.joint_names), dtype=case.dtype)
     model.set_frame_velocity_representation(adam.Representations.BODY_FIXED_REPRESENTATION)
 
     def placed_mass(turn, q):

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-import jffsr
+from experiments.benchmarks.bodies import plain_urdf
 from experiments.benchmarks.cases import Case
 from experiments.benchmarks.opponents import integrate
 
@@ -22,7 +22,7 @@ def twist(case: Case):
         from frax.core.robot import Robot
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot.urdf"
-        path.write_text(jffsr.to_urdf(case.robot), encoding="utf-8")
+        path.write_text(plain_urdf(case.robot), encoding="utf-8")
         model = Robot(str(path), joint_ordering=list(case.robot.joint_names), floating_base="quaternion")
 
     def of(q, qd, quaternion):

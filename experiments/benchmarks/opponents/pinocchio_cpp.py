@@ -13,10 +13,8 @@ from experiments.benchmarks.cases import FLOAT64, Case
 from experiments.benchmarks.native.build import library, pointer
 from experiments.benchmarks.opponents.program import Program, Unsupported
 
-MASS_MATRIX, CENTROIDAL = 0, 1
 
-
-def rollouts(case: Case, threads: int, way: int = MASS_MATRIX, shared: bool = False) -> Program:
+def rollouts(case: Case, threads: int, shared: bool = False) -> Program:
     """Final base quaternions (batch, 4)."""
     code, seconds, robot = _robot(case)
     table = law_table(case)
@@ -25,14 +23,14 @@ def rollouts(case: Case, threads: int, way: int = MASS_MATRIX, shared: bool = Fa
     def run():
         code.rollouts(
             robot, pointer(table), ctypes.c_double(case.step), case.steps, pointer(free), case.batch,
-            pointer(out), way, int(shared), threads,
+            pointer(out), int(shared), threads,
         )  # fmt: skip
         return out
 
     return Program(run, seconds)
 
 
-def twists(case: Case, threads: int, way: int = MASS_MATRIX) -> Program:
+def twists(case: Case, threads: int) -> Program:
     """Base twists (batch, 6) of single evaluations."""
     code, seconds, robot = _robot(case)
     position, rate, attitude = (np.ascontiguousarray(x) for x in case.postures)
@@ -40,7 +38,7 @@ def twists(case: Case, threads: int, way: int = MASS_MATRIX) -> Program:
 
     def run():
         code.twists(
-            robot, pointer(position), pointer(rate), pointer(attitude), case.batch, pointer(out), way, threads
+            robot, pointer(position), pointer(rate), pointer(attitude), case.batch, pointer(out), threads
         )
         return out
 
