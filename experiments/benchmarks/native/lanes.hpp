@@ -23,37 +23,6 @@ inline Lanes root(Lanes x) {
 // To the nearest whole number, for what is far below 2^51.
 inline Lanes nearest(Lanes x) { return (x + 6755399441055744.0) - 6755399441055744.0; }
 
-inline void sine_cosine(Lanes angle, Lanes& sine, Lanes& cosine) {
-    // pi/2 in three parts; Taylor's series to order 17 and 18 inside [-pi/4, pi/4].
-    const Lanes turns = nearest(angle * 0.63661977236758134308);
-    const Lanes rest =
-        ((angle - turns * 1.5707963267341256) - turns * 6.0771005063039659e-11) - turns * 2.0222662487959506e-21;
-    const Lanes x = rest * rest;
-    Lanes s = all(1 / 355687428096000.0);
-    s = s * x - 1 / 1307674368000.0;
-    s = s * x + 1 / 6227020800.0;
-    s = s * x - 1 / 39916800.0;
-    s = s * x + 1 / 362880.0;
-    s = s * x - 1 / 5040.0;
-    s = s * x + 1 / 120.0;
-    s = s * x - 1 / 6.0;
-    s = rest + rest * x * s;
-    Lanes c = all(-1 / 6402373705728000.0);
-    c = c * x + 1 / 20922789888000.0;
-    c = c * x - 1 / 87178291200.0;
-    c = c * x + 1 / 479001600.0;
-    c = c * x - 1 / 3628800.0;
-    c = c * x + 1 / 40320.0;
-    c = c * x - 1 / 720.0;
-    c = c * x + 1 / 24.0;
-    c = (1.0 - 0.5 * x) + x * x * c;
-    const Lanes quarter = turns - 4.0 * nearest(0.25 * turns - 0.375);
-    const auto odd = (quarter == 1.0) | (quarter == 3.0);
-    const Lanes first = odd ? c : s, second = odd ? s : c;
-    sine = (quarter >= 2.0) ? -first : first;
-    cosine = ((quarter == 1.0) | (quarter == 2.0)) ? -second : second;
-}
-
 // Stands for a number and counts what is done with it; a division or a root counts one.
 struct Counted {
     static inline int64_t operations = 0;
@@ -67,7 +36,28 @@ inline Counted operator-(Counted, Counted) { return counted(); }
 inline Counted operator*(Counted, Counted) { return counted(); }
 inline Counted operator/(Counted, Counted) { return counted(); }
 inline Counted root(Counted) { return counted(); }
-inline void sine_cosine(Counted, Counted&, Counted&) {
-    // One for the range, six for the rest, 2 + 16 + 3 and 16 + 6 for the two series, four for the quarter.
-    Counted::operations += 54;
+inline Counted nearest(Counted) { return counted(), counted(); }
+
+// sin(angle - multiple pi), negative for odd turns: pi in three parts, Taylor's series of 11 terms on what is left.
+template <class T>
+inline T signed_series(T angle, T multiple, T turns) {
+    const T rest =
+        ((angle - multiple * 3.1415926534682512) - multiple * 1.2154201012607932e-10) - multiple * 4.044532497591901e-21;
+    const T odd = turns - 2.0 * nearest(0.5 * turns - 0.25);
+    const T square = rest * rest;
+    constexpr double factors[] = {
+        1 / 51090942171709440000.0, -1 / 121645100408832000.0, 1 / 355687428096000.0, -1 / 1307674368000.0,
+        1 / 6227020800.0, -1 / 39916800.0, 1 / 362880.0, -1 / 5040.0, 1 / 120.0, -1 / 6.0,
+    };
+    T total{};
+    for (double factor : factors) total = (total + factor) * square;
+    return (1.0 - 2.0 * odd) * (rest + rest * total);
+}
+
+template <class T>
+inline void sine_cosine(T angle, T& sine, T& cosine) {
+    const T whole = nearest(angle * 0.31830988618379067154);
+    const T half = nearest(angle * 0.31830988618379067154 - 0.5);
+    sine = signed_series(angle, whole, whole);
+    cosine = -signed_series(angle, half + 0.5, half);
 }

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import jffsr
 from experiments.benchmarks.cases import Case, initial_state
 from experiments.benchmarks.opponents.integrate import rotation_matrix
-from jffsr.rollouts.joint_terms import joint_terms
+from jffsr.rollouts.hot_path import hot_joint_terms
 from jffsr.spatial.components import add, cross
 
 IN_CHUNKS = True
@@ -40,7 +40,7 @@ def twists(case: Case):
     robot = case.robot
 
     def of(q, qd, quaternion):
-        terms = joint_terms(robot, q, qd)
+        terms = hot_joint_terms(robot, q, qd)
         zero = jnp.zeros(q.shape[0], q.dtype)
         omega = terms.base_rate((zero, zero, zero))
         swing = add(cross(omega, terms.com), terms.com_velocity)
