@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -31,8 +32,7 @@ def library(source: str, *options: str, folder: Path | None = None) -> tuple[cty
     folder = folder or Path(tempfile.gettempdir()) / f"jffsr-benchmarks-{os.getuid()}"
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     command = [compiler, *FLAGS, *LINK, *options, str(SOURCES / source)]
-    text = "".join(file.read_text() for file in sorted(SOURCES.glob("*.?pp")))
-    name = hashlib.sha256(" ".join([*command, sys.version, text]).encode()).hexdigest()[:16]
+    name = hashlib.sha256(" ".join([*command, sys.version, with_headers(source)]).encode()).hexdigest()[:16]
     target, seconds = folder / f"{Path(source).stem}-{name}.so", 0.0
     if not target.exists():
         started = time.perf_counter()
@@ -43,6 +43,12 @@ def library(source: str, *options: str, folder: Path | None = None) -> tuple[cty
         os.replace(part, target)
         seconds = time.perf_counter() - started
     return ctypes.CDLL(str(target)), seconds
+
+
+def with_headers(source: str) -> str:
+    """The text of a source and of the headers here that it includes."""
+    text = (SOURCES / source).read_text(encoding="utf-8")
+    return text + "".join(with_headers(name) for name in re.findall(r'#include "(.+)"', text))
 
 
 def first_error(output: str) -> str:
