@@ -7,6 +7,8 @@ UV ?= $(shell command -v uv 2>/dev/null)
 CONFIG ?= configs/planning/composite_wu6.yaml
 WORKERS ?= auto
 PYTEST_ARGS ?=
+BENCH_VENV ?= .venv-bench
+QUICK ?=
 
 # A PYTHONPATH that another tool set (ROS does) would hide missing packages and load foreign pytest plugins.
 unexport PYTHONPATH PYTHONHOME
@@ -21,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-native bench lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -41,6 +43,17 @@ check-slow: $(STAMP)  ## run the heavier checks
 check-physics: $(STAMP)  ## check 1,000 random robots against MuJoCo and the laws of mechanics
 	$(VENV_PYTHON) tests/physics/check_physics.py
 	$(PYTEST) -m physics $(PYTEST_ARGS)
+
+check-native: $(STAMP)  ## check the benchmark's C++ kernel against the package (needs a C++ compiler)
+	$(PYTEST) -m native $(PYTEST_ARGS)
+
+bench:  ## time rollouts against everything else that computes them (QUICK=1: some of it)
+	@$(MAKE) --no-print-directory venv VENV="$(BENCH_VENV)"
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(BENCH_VENV)/bin/python",\
+	    "$(BENCH_VENV)/bin/python" -m pip install --quiet --no-input --disable-pip-version-check) \
+	    -e '.[bench]' -c constraints.txt \
+	    || echo "Not all opponents could be installed; the table says which are missing." >&2
+	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks $(if $(QUICK),--quick --out runs/benchmarks/rollouts.md)
 
 lint: $(STAMP)  ## check style and format
 	$(VENV_PYTHON) -m ruff check .
