@@ -1,8 +1,11 @@
-"""`jax.jit` with the options that the installed version of JAX needs.
+"""`jax.jit` with the options that the installed version of JAX needs for rollouts on the CPU.
 
-Before 0.11 the CPU backend's fusion emitters, on by default, compute a producer again for each of its consumers:
-in a trial with jax 0.10.2, eight gradients of a seven-axis arm's index took 7.4 s with them and 3 ms without. Later
-versions neither have the option nor the fault.
+* Vectors of 512 bits where the processor has them; the compiler prefers 256. In a trial (AVX-512, seven axes,
+  float64) an evaluation of the joint terms took 56 ns instead of 105, and in float32 30 instead of 53. Processors
+  with shorter registers are not affected.
+* Before 0.11 the CPU backend's fusion emitters, on by default, compute a producer again for each of its consumers:
+  in a trial with jax 0.10.2, eight gradients of a seven-axis arm's index took 7.4 s with them and 3 ms without.
+  Later versions neither have the option nor the fault.
 """
 
 from __future__ import annotations
@@ -11,7 +14,9 @@ from functools import partial
 
 import jax
 
-OPTIONS = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else None
+OPTIONS = {"xla_cpu_prefer_vector_width": 512}
+if jax.__version_info__ < (0, 11):
+    OPTIONS["xla_cpu_use_fusion_emitters"] = False
 
 # The code generator's own optimisations are half of what compiling takes. Without them a program runs about four
 # times longer, which does not matter to one that runs once, in some milliseconds.

@@ -11,6 +11,7 @@ from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.kernels import FAST
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
 from jffsr.trajectories.interface import PlannedTrajectory
@@ -27,8 +28,8 @@ class Problem:
     """Choose the free numbers of `trajectory` so that the index of the motion is least.
 
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
-    L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode,
-    static, is that of `jffsr.rollout`. All else is traced: problems of one robot with other numbers share
+    L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode
+    and kernel, static, are those of `jffsr.rollout`. All else is traced: problems of one robot with other numbers share
     their compiled programs.
     """
 
@@ -39,6 +40,7 @@ class Problem:
     momentum: Array = field(default_factory=lambda: np.zeros(6))
     num_steps: int = field(default=100, metadata={"static": True})
     base_mode: str = field(default=FLOATING, metadata={"static": True})
+    kernel: str = field(default=FAST, metadata={"static": True})
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (k,) of the free numbers."""
@@ -54,6 +56,7 @@ class Problem:
             num_steps=self.num_steps,
             momentum=self.momentum,
             base_mode=self.base_mode,
+            kernel=self.kernel,
         )
 
     def value(self, candidate: Vector) -> Scalar:

@@ -51,6 +51,11 @@ def rows_product(a: Rows, b: Rows) -> Rows:
     return tuple(tuple(dot(row, column) for column in columns) for row in a)
 
 
+def symmetric_elements(matrix: Array) -> Symmetric:
+    """The six elements, in the order of `Symmetric`, of symmetric matrices (..., 3, 3)."""
+    return tuple(matrix[..., r, k] for r, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+
+
 def symmetric_times(s: Symmetric, v: Components) -> Components:
     """S v."""
     xx, yy, zz, xy, xz, yz = s

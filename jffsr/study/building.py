@@ -40,6 +40,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         momentum=np.array(task.momentum),
         num_steps=config.rollout.num_steps,
         base_mode=config.rollout.base_mode,
+        kernel=config.rollout.kernel,
     )
     _check_user_terms(config, problem)
     return problem

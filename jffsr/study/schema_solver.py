@@ -10,6 +10,7 @@ from pydantic import model_validator
 from jffsr.dynamics.base_mode import BASE_MODES, FLOATING
 from jffsr.reading.section import Section
 from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
+from jffsr.rollouts.kernels import FAST, KERNELS
 
 Positive = Annotated[float, number(gt=0)]
 Flag = Annotated[bool, flag()]
@@ -26,10 +27,11 @@ class Trajectory(Section):
 
 
 class Rollout(Section):
-    """Steps of the base motion's integration, and how the base is held meanwhile."""
+    """Steps of the base motion's integration, how the base is held meanwhile, and which code finds the inertias."""
 
     num_steps: Annotated[int, whole(4, 100_000)] = 100
     base_mode: Annotated[Literal["floating", "attitude_held", "fixed"], choice(*BASE_MODES)] = FLOATING
+    kernel: Annotated[Literal["fast", "plain"], choice(*KERNELS)] = FAST
 
 
 class Optimizer(Section):

@@ -106,11 +106,20 @@ class SinePolynomial:
 
     def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]:
         """Joint position, rate and acceleration, (n,) each, at a time in [0, duration]."""
+        return self.on_grid(jnp.asarray(time))
+
+    def on_grid(self, time: Array) -> tuple[Array, Array, Array]:
+        """The same at times of any shape, which follows the joints': (n, ...) each."""
+
+        def by_joint(x: Array) -> Array:
+            return jnp.reshape(x, jnp.shape(x) + (1,) * time.ndim)
+
         half, middle = (self.upper - self.lower) / 2, (self.upper + self.lower) / 2
-        u0 = jnp.arcsin((self.start - middle) / half)
-        u1 = jnp.arcsin((self.goal - middle) / half)
+        u0 = by_joint(jnp.arcsin((self.start - middle) / half))
+        u1 = by_joint(jnp.arcsin((self.goal - middle) / half))
+        alpha, beta = by_joint(self.coefficients[:, 0]), by_joint(self.coefficients[:, 1])
+        half, middle = by_joint(half), by_joint(middle)
         s = time / self.duration
-        alpha, beta = self.coefficients[:, 0], self.coefficients[:, 1]
 
         ramp = s**3 * (10 + s * (-15 + 6 * s))
         ramp_1 = 30 * s**2 * (s - 1) ** 2

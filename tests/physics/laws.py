@@ -25,7 +25,7 @@ import jffsr
 from jffsr.crosscheck.mujoco_model import to_mjmodel
 from jffsr.robots.robot import Robot, Topology
 from jffsr.robots.state import State
-from jffsr.rollouts.joint_terms import joint_terms
+from jffsr.rollouts.hot_path import hot_joint_terms
 from jffsr.spatial.rotation import quaternion_multiply, quaternion_to_matrix
 
 TOLERANCE = 1e-9
@@ -61,7 +61,7 @@ def evaluate(robot: Robot, state: State, torque):
     h_b, h_bm, h_m = jffsr.inertia_blocks(robot, kin)
     acceleration = jffsr.forward_dynamics(robot, kin, *velocities, torque)
     back, base = jffsr.inverse_dynamics(robot, kin, *velocities, acceleration[6:])
-    terms = joint_terms(robot, state.joint_position[None], state.joint_velocity[None])
+    terms = hot_joint_terms(robot, state.joint_position[None], state.joint_velocity[None])
     return {
         "rollout_inertia": jnp.array(terms.inverse_inertia)[:, 0],
         "rollout_rate": jnp.array(terms.base_rate((0.0, 0.0, 0.0)))[:, 0],

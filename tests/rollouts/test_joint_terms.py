@@ -1,11 +1,12 @@
-"""The base-frame terms of the fast path against the inertia blocks of the readable one.
+"""The joint terms of the hot path against those of the plain one, in value and derivatives, for every robot.
 
-One chain, one tree with joints of both kinds, and the same tree with sliding joints alone; for the other robots
-the agreement of whole motions says the same.
+Robots with the same tree go through one compiled program, so that the whole catalogue costs five of them; a tree
+of the tests brings sliding joints between turning ones (random trees: tests/physics).
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 
 import chex
@@ -14,51 +15,117 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jffsr.dynamics.kinematics import kinematics, system_com
-from jffsr.dynamics.momentum import base_twist, inertia_blocks, momentum
-from jffsr.robots.robot import PRISMATIC
+from jffsr.dynamics.kinematics import kinematics
+from jffsr.dynamics.momentum import base_twist
+from jffsr.errors import InputError
+from jffsr.robots.loading import list_robots
+from jffsr.robots.robot import PRISMATIC, REVOLUTE, Robot
 from jffsr.robots.state import State
-from jffsr.rollouts.joint_terms import joint_terms
-from jffsr.spatial.inertia import parallel_axis, skew
+from jffsr.rollouts.hot_path import hot_joint_terms
+from jffsr.rollouts.plain_path import plain_joint_terms
+from jffsr.rollouts.rollout import rollout
 
-STATES = 5
+STATES = 4
 
 
-@pytest.mark.parametrize("name", ["wu_2018_6dof", "two_arms", "slides"])
-def test_joint_terms_are_the_inertia_blocks_without_linear_momentum(robots, name):
-    """With the base at the identity pose I and B coincide; the linear momentum is eliminated by hand."""
-    robot = robots["two_arms" if name == "slides" else name]
-    if name == "slides":
-        kinds = (PRISMATIC,) * robot.num_joints
-        robot = robot.replace(topology=replace(robot.topology, joint_types=kinds))
-    rng = np.random.default_rng(5)
-    q, qd = rng.uniform(-2, 2, (2, STATES, robot.num_joints))
-    angular_momentum = rng.normal(size=3)
-
-    def blocks(robot, q, qd):
-        kin = kinematics(robot, State(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), q))
-        h_b, h_bm, _ = inertia_blocks(robot, kin)
-        com = system_com(robot, kin)
-        total = h_b[0, 0]
-        locked = h_b[3:, 3:] - total * parallel_axis(com)
-        carried = (h_bm[3:] - skew(com) @ h_bm[:3]) @ qd
-        given = jnp.concatenate([jnp.zeros(3), angular_momentum])
-        rate = base_twist(robot, kin, qd, given)[3:]
-        held = momentum(robot, kin, jnp.zeros(6), qd)
-        return locked, carried, com, h_bm[:3] @ qd / total, rate, held[3:]
-
-    locked, carried, com, com_velocity, rate, held = jax.jit(jax.vmap(blocks, (None, 0, 0)))(robot, q, qd)
-    terms = jax.jit(joint_terms)(robot, q, qd)
-    xx, yy, zz, xy, xz, yz = terms.inverse_inertia
-    inverse = jnp.moveaxis(jnp.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), -1, 0)
-
-    chex.assert_shape(inverse, (STATES, 3, 3))
-    near = {"rtol": 1e-12, "atol": 1e-12}
-    np.testing.assert_allclose(inverse, np.linalg.inv(locked), **near)
-    np.testing.assert_allclose(
-        jnp.stack(terms.joint_rate, -1), np.linalg.solve(locked, carried[..., None])[..., 0], **near
+def _moved(robot: Robot, q, qd, masses, lever):
+    """The robot and its motion with the numbers that the derivatives are taken by."""
+    changed = robot.replace(
+        mass=robot.mass * (1 + masses), joint_position=robot.joint_position + lever, inertia=robot.inertia
     )
-    np.testing.assert_allclose(jnp.stack(terms.com, -1), com, **near)
-    np.testing.assert_allclose(jnp.stack(terms.com_velocity, -1), com_velocity, **near)
-    np.testing.assert_allclose(jnp.stack(terms.base_rate(tuple(angular_momentum)), -1), rate, **near)
-    np.testing.assert_allclose(carried, held, **near)
+    return changed, q, qd
+
+
+def _value_and_pullback(terms):
+    """Terms at the given numbers, and their vector-Jacobian product by joints, masses and lengths."""
+
+    @jax.jit
+    @jax.vmap
+    def run(robot, q, qd, weights):
+        free = (q, qd, jnp.zeros_like(robot.mass), jnp.zeros_like(robot.joint_position))
+
+        def stacked(*free):
+            found = terms(*_moved(robot, *free))
+            return jnp.stack(jax.tree.leaves(found))
+
+        value, pull_back = jax.vjp(stacked, *free)
+        return value, pull_back(weights)
+
+    return run
+
+
+def _compare(robots: list[Robot]):
+    n, rng = robots[0].num_joints, np.random.default_rng(5)
+    structure = jax.tree.structure(robots[0])
+    leaves = [np.stack(x) for x in zip(*(jax.tree.leaves(robot) for robot in robots), strict=True)]
+    stacked = jax.tree.unflatten(structure, leaves)
+    q, qd = rng.uniform(-2, 2, (2, len(robots), STATES, n))
+    weights = rng.normal(size=(len(robots), 15, STATES))
+    value, slopes = _value_and_pullback(hot_joint_terms)(stacked, q, qd, weights)
+    expected, expected_slopes = _value_and_pullback(plain_joint_terms)(stacked, q, qd, weights)
+    chex.assert_shape(value, (len(robots), 15, STATES))
+    np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-12)
+    for slope, other in zip(slopes, expected_slopes, strict=True):
+        for one, another in zip(np.asarray(slope), np.asarray(other), strict=True):
+            size = np.linalg.norm(another)
+            assert size > 0
+            np.testing.assert_allclose(one, another, rtol=0, atol=1e-12 * size)
+
+
+def _same_trees(robots: dict[str, Robot]) -> dict[tuple, list[str]]:
+    groups = defaultdict(list)
+    for name in list_robots():
+        shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(robots[name]))
+        topology = robots[name].topology
+        groups[topology.parents, topology.joint_types, shapes].append(name)
+    return groups
+
+
+@pytest.mark.parametrize("place", range(5))
+def test_every_robot_of_the_catalogue(robots, place):
+    groups = list(_same_trees(robots).values())
+    assert len(groups) == 5, "a robot with another tree wants a place of its own here"
+    _compare([robots[name] for name in groups[place]])
+
+
+@pytest.mark.parametrize("kinds", ["both", "slides"])
+def test_a_tree_with_several_tips(robots, kinds):
+    robot = robots["two_arms"]
+    assert {REVOLUTE, PRISMATIC} == set(robot.topology.joint_types)
+    assert len(robot.end_effector_names) == 2
+    if kinds == "slides":
+        topology = replace(robot.topology, joint_types=(PRISMATIC,) * robot.num_joints)
+        robot = robot.replace(topology=topology)
+    _compare([robot])
+
+
+def test_base_rate_is_that_of_the_momentum_equation(robots):
+    """The plain path too is held to something else: the 6 x 6 solve for the base twist."""
+    robot, rng = robots["two_arms"], np.random.default_rng(6)
+    q, qd = rng.uniform(-2, 2, (2, STATES, robot.num_joints))
+    angular = rng.normal(size=3)
+
+    def rate(q, qd):
+        kin = kinematics(robot, State(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), q))
+        return base_twist(robot, kin, qd, jnp.concatenate([jnp.zeros(3), angular]))[3:]
+
+    expected = jax.jit(jax.vmap(rate))(q, qd)
+    for terms in (hot_joint_terms, plain_joint_terms):
+        found = jax.jit(terms)(robot, q, qd).base_rate(tuple(angular))
+        np.testing.assert_allclose(jnp.stack(found, -1), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_both_kernels_give_one_motion(robots):
+    robot = robots["hu_2011_planar2"]
+    state = State(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(2))
+
+    def swing(time):
+        return tuple(jnp.array([a * jnp.sin(time), b * jnp.cos(time)]) for a, b in ((1, 1), (1, -1), (-1, 1)))
+
+    def run(kernel):
+        return rollout(robot, swing, state, 1.0, 8, np.arange(6.0), kernel=kernel)
+
+    fast, plain = jax.jit(run, static_argnums=0)("fast"), jax.jit(run, static_argnums=0)("plain")
+    chex.assert_trees_all_close(fast, plain, rtol=1e-12, atol=1e-12)
+    with pytest.raises(InputError, match="kernel is 'fats'; allowed are fast, plain"):
+        run("fats")

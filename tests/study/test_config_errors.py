@@ -51,7 +51,7 @@ ADDED = {
     "a pair [low, high] with low < high is expected",
     "limits: {base_excursion: [1, 2]}\n": "x.yaml:7: limits.base_excursion: found [1, 2], "
     "a list of 3 numbers > 0 (one per axis) is expected",
-    "rollout: 3\n": "x.yaml:7: rollout: found 3, a mapping of num_steps, base_mode is expected",
+    "rollout: 3\n": "x.yaml:7: rollout: found 3, a mapping of num_steps, base_mode, kernel is expected",
     "rollout: {num_steps: 3}\n": "x.yaml:7: rollout.num_steps: found 3, "
     "a whole number in [4, 100000] is expected",
     "rollout: {base_mode: fixd}\n": "x.yaml:7: rollout.base_mode: found 'fixd', "
