@@ -218,13 +218,13 @@ def _robots(arguments: argparse.Namespace) -> int:
 
 
 def _prepare_jax(precision: str = "float64") -> None:
-    """Set what only an entry point may set: the precision, and a folder that keeps compiled programs."""
+    """Set what only an entry point may set: the precision, and the folder that keeps compiled programs."""
     import jax
 
+    from jffsr.compiling.keeping import keep_programs
+
     jax.config.update("jax_enable_x64", precision == "float64")
-    default = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "jffsr" / "xla"
-    jax.config.update("jax_compilation_cache_dir", os.environ.get("JFFSR_CACHE_DIR", str(default)))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+    keep_programs()
 
 
 if __name__ == "__main__":

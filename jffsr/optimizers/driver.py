@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from jffsr.compiling import jit
+from jffsr.compiling import Program, program
 from jffsr.errors import InputError
 from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
 from jffsr.parallel.devices import all_devices, on_all_devices
@@ -89,7 +89,7 @@ class Outcome:
         return self.reason == "interrupted"
 
 
-@jit
+@program()
 def _init(optimizer, problem, key, population):
     # A step gives back strongly typed numbers: a weakly typed start would compile the first chunk on its own.
     return jax.tree.map(_strongly_typed, optimizer.init(key, problem, population))
@@ -114,7 +114,7 @@ def _advance(optimizer, problem, state, stop, length):
     return jax.lax.scan(one, state, idle)
 
 
-_advance_jit = jit(_advance, static_argnums=4)
+_advance_jit = Program(_advance, static_argnums=4)
 
 
 def run(

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from jffsr.compiling import jit
+from jffsr.compiling import Program, program
 from jffsr.errors import InputError
 from jffsr.objectives.composite import TermValue
+from jffsr.optimizers.ahead import prepare_run
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
-from jffsr.planning.sensitivity import Sensitivity, sensitivity
+from jffsr.planning.sensitivity import Sensitivity, prepare_sensitivity, sensitivity
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
 from jffsr.rollouts.motion import Motion
@@ -76,10 +77,14 @@ class SearchInterrupted(Exception):
         self.outcome = outcome
 
 
-@partial(jit, static_argnums=2)
+@program(static_argnums=2, once=True)
 def _verified(problem: Problem, candidate, step_factor: int):
     motion, verification = verify(problem, candidate, step_factor)
-    return motion, problem.objective.breakdown(problem.robot, motion), verification
+    terms = problem.objective.breakdown(problem.robot, motion)
+    return motion, terms, verification, problem.trajectory.with_free(candidate)
+
+
+_judged = Program(result_code, static_argnums=3, once=True)
 
 
 def solve(
@@ -107,24 +112,22 @@ def solve(
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
     check_precision(precision)
-    with Stopwatch() as watch:
+    phases, key = build_phases(optimizer, settings), jax.random.key(seed)
+    with Stopwatch() as watch, ExitStack() as at_end:
+        ahead = prepare_run(phases, problem, key, chunk=chunk, resume=resume)
+        ahead += _prepare_review(problem, step_factor, with_sensitivity)
+        for future in ahead:
+            at_end.callback(future.cancel)
         outcome = run(
-            build_phases(optimizer, settings),
-            problem,
-            jax.random.key(seed),
-            chunk=chunk,
-            resume=resume,
-            on_chunk=on_chunk,
-            interrupted=interrupted,
+            phases, problem, key, chunk=chunk, resume=resume, on_chunk=on_chunk, interrupted=interrupted
         )
         if outcome.interrupted:
             raise SearchInterrupted(outcome)
         with jax.enable_x64(True):
-            free = jnp.asarray(np.asarray(outcome.best_position, dtype=float))
+            free = np.asarray(outcome.best_position, dtype=float)
             verified = _verified(problem, free, step_factor)
-            code = result_code(problem, verified[2], _at_its_end(outcome), tolerances)
-            motion, terms, verification = jax.device_get(verified)
-            trajectory = jax.device_get(problem.trajectory.with_free(free))
+            code = _judged(problem, verified[2], np.array(_at_its_end(outcome)), tolerances)
+            motion, terms, verification, trajectory = jax.device_get(verified)
             derivatives = sensitivity(problem, free) if with_sensitivity else None
     result = explain(int(code), problem, verification, tolerances)
     return Plan(
@@ -143,6 +146,16 @@ def solve(
         seconds=watch.as_dict(),
         sensitivity=derivatives,
     )
+
+
+def _prepare_review(problem: Problem, step_factor: int, with_sensitivity: bool) -> list[Future]:
+    """Begin to compile, in threads, what follows the search."""
+    with jax.enable_x64(True):
+        free = jax.ShapeDtypeStruct(jax.eval_shape(problem.bounds)[0].shape, float)
+        prepared = [_verified.prepare(problem, free, step_factor)]
+        if with_sensitivity:
+            prepared.append(prepare_sensitivity(problem, free))
+    return [future for future in prepared if future is not None]
 
 
 def _at_its_end(outcome: Outcome) -> bool:

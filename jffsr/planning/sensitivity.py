@@ -7,6 +7,7 @@ norms are zero, which is where an optimizer ends; so the derivative of the index
 
 from __future__ import annotations
 
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jffsr.compiling import jit
+from jffsr.compiling import program
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.planning.problem import Problem
 from jffsr.robots.state import State
@@ -137,12 +138,17 @@ def sensitivity(problem: Problem, free: Vector) -> Sensitivity:
     One compiled Jacobian, which problems of the same structure share.
     """
     robot = problem.robot
-    nominal, derivative = jax.device_get(_jacobian(problem, jnp.asarray(free)))
+    nominal, derivative = jax.device_get(_jacobian(problem, free))
     names = robot.end_effector_names
     return Sensitivity(robot.body_names, names[0] if names else None, nominal, derivative)
 
 
-@jit
+def prepare_sensitivity(problem: Problem, free: Vector | jax.ShapeDtypeStruct) -> Future | None:
+    """Begin to compile, in a thread, what `sensitivity` with arguments of these shapes will call."""
+    return _jacobian.prepare(problem, free)
+
+
+@program(once=True)
 def _jacobian(problem: Problem, free: Vector) -> tuple[Inertials, PlanEnd]:
     robot = problem.robot
     inertia = jnp.asarray(robot.inertia)

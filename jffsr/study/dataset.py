@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from jffsr.compiling import Program
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
 from jffsr.planning.plan import Plan
 from jffsr.writing import write_atomically
 
+_attitude_angles = Program(attitude_angles, static_argnums=1, once=True)
 _SECOND = {"revolute": "rad", "prismatic": "m"}
 
 
@@ -49,7 +51,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             ),
             "attitude_angle": of(
                 ("time", "axis"),
-                attitude_angles(motion, measure),
+                _attitude_angles(motion, measure),
                 "rad",
                 f"base attitude relative to its start ({measure})",
             ),

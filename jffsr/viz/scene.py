@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
+from jffsr.compiling import program
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -55,7 +56,7 @@ class Scene:
         return self.rotation[:, 0]
 
 
-@jax.jit
+@program(once=True)
 def _all_kinematics(robot, position, quaternion, joints):
     return jax.vmap(lambda r, q, j: kinematics(robot, State(r, q, j)))(position, quaternion, joints)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from shifted_functions import LOWER, UPPER, rosenbrock, sphere
 
+from jffsr.compiling import Program
 from jffsr.errors import InputError
 from jffsr.optimizers import driver
 from jffsr.optimizers.driver import Phase, Stop, blank_state, run
@@ -125,7 +126,7 @@ def test_no_phase_is_refused():
 def test_other_numbers_do_not_trace_again(monkeypatch):
     """Bounds, coefficients, budgets and seeds are traced: one trace for the swarm, one for both descents."""
     traced = chex.assert_max_traces(driver._advance, n=2)
-    monkeypatch.setattr(driver, "_advance_jit", jax.jit(traced, static_argnums=4))
+    monkeypatch.setattr(driver, "_advance_jit", Program(traced, static_argnums=4))
     for k in range(3):
         problem = FunctionProblem(LOWER[:4] - k, UPPER[:4] + k, rosenbrock)
         settings = replace(

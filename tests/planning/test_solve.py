@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from wu6_problems import GOAL, START, limited, wu6_problem
 
+from jffsr.compiling import Program
 from jffsr.errors import InputError
 from jffsr.optimizers import driver
 from jffsr.optimizers.registry import Settings
@@ -34,8 +35,8 @@ def counted_traces():
     with pytest.MonkeyPatch.context() as patch:
         advance = chex.assert_max_traces(driver._advance, n=2)
         verified = chex.assert_max_traces(plan_module._verified.__wrapped__, n=1)
-        patch.setattr(driver, "_advance_jit", jax.jit(advance, static_argnums=4))
-        patch.setattr(plan_module, "_verified", jax.jit(verified, static_argnums=2))
+        patch.setattr(driver, "_advance_jit", Program(advance, static_argnums=4))
+        patch.setattr(plan_module, "_verified", Program(verified, static_argnums=2))
         yield
 
 
