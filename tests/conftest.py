@@ -15,7 +15,7 @@ jax.config.update("jax_enable_x64", True)
 from jffsr.compiling import OPTIONS  # noqa: E402
 
 # The tests' own programs get the options of the package's: they have to stand here before the first computation.
-for option, value in (OPTIONS or {}).items():
+for option, value in OPTIONS.items():
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --{option}={str(value).lower()}".strip()
 
 from motions import robot_from_record  # noqa: E402

@@ -20,6 +20,7 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.sharding import Mesh
 
 import jffsr
 
@@ -31,13 +32,16 @@ class Unnamed(Exception):
     """Something has no name that would stay the same in another process and change with its meaning."""
 
 
-def digest(function: Callable, options: dict | None, static: list[Any], dynamic: list[Any]) -> str:
+def digest(
+    function: Callable, options: dict | None, static: list[Any], dynamic: list[Any], mesh: Mesh
+) -> str:
     """The name of a program, hexadecimal; Unnamed where it depends on what cannot be told by name."""
     leaves, structure = jax.tree.flatten(dynamic)
     types, values = [jax.typeof(leaf) for leaf in leaves], jax.config.values
     parts = [
         _function(function),
         str(options),
+        "" if mesh.empty else f"{mesh.shape} {mesh.axis_types} {[device.id for device in mesh.devices.flat]}",
         *_surroundings(),
         # Where compiled programs are kept does not change them; attributes also see what a thread has set.
         *(

@@ -1,10 +1,10 @@
 """Functions compiled as wholes: ahead, beside other work, and, where a folder is kept, only once for all processes.
 
-A `Program` does what `jax.jit` does, with three differences. `prepare` compiles it in a thread for arguments of
+A `Program` does what `jax.jit` does, with four differences. `prepare` compiles it in a thread for arguments of
 which only the shapes need be known, so that the main thread can compile or run something else meanwhile: XLA lets
 other Python threads run. What was compiled is looked for in the folder of kept programs first, which also saves
-tracing and lowering; JAX's own cache saves neither. And the time that a caller waited for it can be told apart
-from running (`seconds_waited`).
+tracing and lowering; JAX's own cache saves neither. The time that a caller waited for it can be told apart
+from running (`seconds_waited`). And within a mesh of devices every argument goes to each of them.
 """
 
 from __future__ import annotations
@@ -13,10 +13,12 @@ import threading
 import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial, update_wrapper
+from contextlib import nullcontext
+from functools import partial, update_wrapper, wraps
 from typing import Any
 
 import jax
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jffsr.compiling import store
 from jffsr.compiling.options import ONCE, OPTIONS
@@ -49,7 +51,7 @@ class Program:
         self._static = (static_argnums,) if isinstance(static_argnums, int) else tuple(static_argnums)
         self._options = ONCE if once else OPTIONS
         self._function = function
-        self._jit = jax.jit(function, static_argnums=self._static, compiler_options=self._options)
+        self._jit = jax.jit(_whole(function), static_argnums=self._static, compiler_options=self._options)
         self._compiled: dict[Hashable, Future] = {}
         self._lock = threading.Lock()
         update_wrapper(self, function)
@@ -60,7 +62,9 @@ class Program:
         if signature is None:
             return self._jit(*args)
         executable = self._wait(signature, args)
-        return executable(*(arg for i, arg in enumerate(args) if i not in self._static))
+        dynamic = [arg for i, arg in enumerate(args) if i not in self._static]
+        everywhere = _everywhere()
+        return executable(*(dynamic if everywhere is None else jax.device_put(dynamic, everywhere)))
 
     def prepare(self, *args: Any) -> Future | None:
         """Begin to compile in a thread for arguments like these, of which jax.ShapeDtypeStruct is enough.
@@ -74,7 +78,7 @@ class Program:
             known = self._compiled.get(signature)
             if known is not None and not known.cancelled():
                 return None
-            future = _workers.submit(self._obtain, args, bool(jax.config.jax_enable_x64))
+            future = _workers.submit(self._obtain_as, args, bool(jax.config.jax_enable_x64), _mesh())
             self._compiled[signature] = future
         return future
 
@@ -92,7 +96,7 @@ class Program:
         try:
             if own:
                 try:
-                    future.set_result(self._obtain(args, bool(jax.config.jax_enable_x64)))
+                    future.set_result(self._obtain(args))
                 except BaseException as error:
                     future.set_exception(error)
             return future.result()
@@ -105,32 +109,43 @@ class Program:
             if not _waited.depth:
                 _waited.seconds = seconds_waited() + time.perf_counter() - start
 
-    def _obtain(self, args: tuple[Any, ...], x64: bool) -> Callable[..., Any]:
-        # Whether floats have 64 bits is a matter of the thread.
-        with jax.enable_x64(x64):
-            dynamic = [arg for i, arg in enumerate(args) if i not in self._static]
-            static = [args[i] for i in self._static]
-            name = store.name_of(self._function, self._options, static, dynamic)
-            if name is not None:
-                kept = store.load(name)
-                if kept is not None:
-                    return kept
-            lowered = self._jit.lower(*args)
-            return lowered.compile() if name is None else store.compile_and_save(name, lowered, self._options)
+    def _obtain_as(self, args: tuple[Any, ...], x64: bool, mesh: Mesh) -> Callable[..., Any]:
+        # Whether floats have 64 bits, and the mesh, are matters of the thread.
+        with jax.enable_x64(x64), nullcontext() if mesh.empty else jax.set_mesh(mesh):
+            return self._obtain(args)
+
+    def _obtain(self, args: tuple[Any, ...]) -> Callable[..., Any]:
+        everywhere = _everywhere()
+        dynamic = [arg for i, arg in enumerate(args) if i not in self._static]
+        static = [args[i] for i in self._static]
+        name = store.name_of(self._function, self._options, static, dynamic, _mesh())
+        if name is not None:
+            kept = store.load(name, _mesh())
+            if kept is not None:
+                return kept
+        if everywhere is not None:
+            args = tuple(
+                arg if i in self._static else jax.tree.map(partial(_shape, everywhere), arg)
+                for i, arg in enumerate(args)
+            )
+        lowered = self._jit.lower(*args)
+        return lowered.compile() if name is None else store.compile_and_save(name, lowered, self._options)
 
     def _signature(self, args: tuple[Any, ...]) -> Hashable | None:
-        """What the compiled form depends on; None where `jax.jit` has to do it (traced, or not on one device)."""
+        """What the compiled form depends on; None where `jax.jit` has to do it (traced, or on other devices)."""
         if jax.config.jax_disable_jit or jax.config.jax_debug_nans or jax.config.jax_debug_infs:
             return None
         if jax.config.jax_default_device is not None:
             return None
         dynamic = tuple(arg for i, arg in enumerate(args) if i not in self._static)
         leaves, structure = jax.tree.flatten(dynamic)
-        if not all(map(_is_plain, leaves)):
+        mesh = _mesh()
+        homes = {jax.local_devices()[0]} if mesh.empty else set(mesh.devices.flat)
+        if not homes <= set(jax.local_devices()) or not all(_is_plain(leaf, homes) for leaf in leaves):
             return None
         types = tuple(map(_type, leaves))
         static = tuple(args[i] for i in self._static)
-        return structure, types, static, bool(jax.config.jax_enable_x64)
+        return structure, types, static, bool(jax.config.jax_enable_x64), mesh
 
 
 def program(static_argnums: int | tuple[int, ...] = (), once: bool = False) -> Callable[..., Program]:
@@ -138,13 +153,43 @@ def program(static_argnums: int | tuple[int, ...] = (), once: bool = False) -> C
     return partial(Program, static_argnums=static_argnums, once=once)
 
 
-def _is_plain(leaf: Any) -> bool:
-    """Whether a leaf is a value, or the shape of one, on the default device alone."""
+def _mesh() -> Mesh:
+    """The mesh in use; an empty one where there is none."""
+    return jax.sharding.get_mesh()
+
+
+def _everywhere() -> NamedSharding | None:
+    """A copy on every device of the mesh in use; None where there is no mesh."""
+    mesh = _mesh()
+    return None if mesh.empty else NamedSharding(mesh, PartitionSpec())
+
+
+def _whole(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, every device of a mesh getting all of the results, however they were come by."""
+
+    @wraps(function)
+    def whole(*args: Any) -> Any:
+        found = function(*args)
+        if jax.sharding.get_abstract_mesh().empty:
+            return found
+        return jax.lax.with_sharding_constraint(found, PartitionSpec())
+
+    return whole
+
+
+def _shape(everywhere: NamedSharding, leaf: Any) -> jax.ShapeDtypeStruct:
+    kind = jax.typeof(leaf)
+    weak = getattr(kind, "weak_type", False)
+    return jax.ShapeDtypeStruct(kind.shape, kind.dtype, sharding=everywhere, weak_type=weak)
+
+
+def _is_plain(leaf: Any, homes: set[jax.Device]) -> bool:
+    """Whether a leaf is a value, or the shape of one, that is to be had from these devices."""
     if isinstance(leaf, jax.core.Tracer):
         return False
     if not isinstance(leaf, jax.Array):
         return True
-    return leaf.sharding.device_set == {jax.local_devices()[0]}
+    return leaf.sharding.device_set <= homes | {jax.local_devices()[0]}
 
 
 def _type(leaf: Any) -> tuple[tuple[int, ...], Any, bool]:

@@ -20,6 +20,7 @@ import jax
 import jax.monitoring
 import jax.numpy as jnp
 from jax.experimental import serialize_executable
+from jax.sharding import Mesh
 
 from jffsr.compiling.naming import Unnamed, digest
 
@@ -36,7 +37,9 @@ def open_store(folder: Path | None) -> None:
     _folder = folder
 
 
-def name_of(function: Callable, options: dict | None, static: list[Any], dynamic: list[Any]) -> str | None:
+def name_of(
+    function: Callable, options: dict | None, static: list[Any], dynamic: list[Any], mesh: Mesh
+) -> str | None:
     """The name of a program's compiled form; None where it is not kept.
 
     Not kept are programs that hold what is not the package's own, such as a user's function, whose text may
@@ -45,19 +48,20 @@ def name_of(function: Callable, options: dict | None, static: list[Any], dynamic
     if _folder is None or jax.default_backend() != "cpu":
         return None
     try:
-        return digest(function, options, static, dynamic)
+        return digest(function, options, static, dynamic, mesh)
     except Unnamed as error:
         _logger.debug("%s is not kept: %s", function.__qualname__, error)
         return None
 
 
-def load(name: str) -> Callable[..., Any] | None:
+def load(name: str, mesh: Mesh) -> Callable[..., Any] | None:
     """The compiled form under a name, ready to be called; None where there is none that can be read."""
+    devices = jax.local_devices()[:1] if mesh.empty else list(mesh.devices.flat)
     path = _path(name)
     try:
         _find_lapack()
         parts = pickle.loads(zlib.decompress(path.read_bytes()))
-        executable = serialize_executable.deserialize_and_load(*parts)
+        executable = serialize_executable.deserialize_and_load(*parts, execution_devices=devices)
         os.utime(path)
     except FileNotFoundError:
         return None

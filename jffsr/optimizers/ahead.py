@@ -9,6 +9,7 @@ import jax
 from jffsr.optimizers import driver
 from jffsr.optimizers.driver import Phase, Snapshot
 from jffsr.optimizers.interface import OptimizationProblem
+from jffsr.parallel.devices import all_devices
 from jffsr.types import Array
 
 
@@ -24,6 +25,13 @@ def prepare_run(
 
     The futures may be cancelled where the run ends early.
     """
+    with all_devices():
+        return _prepared(phases, problem, key, chunk, resume)
+
+
+def _prepared(
+    phases: list[Phase], problem: OptimizationProblem, key: Array, chunk: int, resume: Snapshot | None
+) -> list[Future]:
     first = resume.phase if resume else 0
     population, prepared = None, []
     for index in range(first, len(phases)):
