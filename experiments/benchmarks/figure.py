@@ -6,6 +6,7 @@ from pathlib import Path
 
 from experiments.benchmarks.cases import ROBOTS
 from experiments.benchmarks.opponents import registry as r
+from experiments.benchmarks.tables import number
 
 # Told apart in grey as well: each line has its own mark and dashes.
 STYLES = {
@@ -48,7 +49,7 @@ def _bars(axes, measured: list[dict]) -> None:
     for place, name in enumerate(names):
         colour = STYLES.get(name, ("#9a9a9a",))[0]
         axes.barh(place, one[name], height=0.62, color=colour, alpha=0.85)
-        axes.text(one[name] * 1.12, place, f"{one[name]:,.3g}", va="center", fontsize=8)
+        axes.text(one[name] * 1.12, place, number(one[name]), va="center", fontsize=8)
         if name in many:
             axes.plot(many[name], place, marker="|", markersize=14, markeredgewidth=2.5, color="white")
             axes.plot(many[name], place, marker="|", markersize=14, markeredgewidth=1.2, color="black")
@@ -74,6 +75,7 @@ def _lines(axes, measured: list[dict], axis: str, label: str) -> None:
                 markersize=5,
                 label=name,
             )
+    axes.set_visible(bool(axes.lines))
     axes.set(xscale="log", yscale="log")
     axes.set_xlabel(label)
     axes.set_ylabel("microseconds a rollout, one core")

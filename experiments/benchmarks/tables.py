@@ -31,10 +31,21 @@ def report(rows: list[dict]) -> str:
         _planning(rows),
         "### One thing varied\n\nMicroseconds a rollout, one core; the rest as in the first table. "
         "A mark ≈ says that a smaller batch was run, because the whole would take too long.",
-        *(_axis(rows, axis) for axis in ("batch", "steps", "robot", "precision")),
+        "\n\n".join(filter(None, (_axis(rows, axis) for axis in ("batch", "steps", "robot", "precision")))),
         _ceiling(rows),
     ]
-    return "\n\n".join(part for part in parts if part)
+    # A section is left out with its heading where nothing of it was measured.
+    kept = [
+        part
+        for part, following in zip(parts, [*parts[1:], "end"], strict=True)
+        if part and (following or not part.startswith("###"))
+    ]
+    return "\n\n".join(kept)
+
+
+def number(value: float) -> str:
+    """Three digits, and no powers of ten where there are more."""
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def _measured(rows, work, threads=1, **where) -> list[dict]:
@@ -81,8 +92,8 @@ def _ranking(rows, work, threads, batch=1024, unit=1e6, unit_name="us") -> str:
         each, best = row["median"] / row["done"], row["best"] / row["done"]
         difference = f"{row['difference']:.1e}" if row["opponent"] != r.FAST else "0"
         lines.append(
-            f"| {row['opponent']} | {unit * each:.4g} | {unit * best:.4g} | {1 / each:,.0f} | {each / fast:.3g} | "
-            f"{row['compile']:.1f} | {row['done']:,} | {difference} |"
+            f"| {row['opponent']} | {number(unit * each)} | {number(unit * best)} | {1 / each:,.0f} | "
+            f"{each / fast:.3g} | {row['compile']:.1f} | {row['done']:,} | {difference} |"
         )
     for row in found:
         if "missing" in row:
@@ -102,10 +113,10 @@ def _planning(rows) -> str:
                     continue
                 each, best = 1e6 * row["median"] / row["done"], 1e6 * row["best"] / row["done"]
                 lines.append(
-                    f"| {work}, {row['opponent']} | {threads} | {each:.4g} | {best:.4g} | "
-                    f"{each * row['batch'] / 1e3:.4g} | {row['compile']:.1f} |"
+                    f"| {work}, {row['opponent']} | {threads} | {number(each)} | {number(best)} | "
+                    f"{number(each * row['batch'] / 1e3)} | {row['compile']:.1f} |"
                 )
-    return "\n".join(lines)
+    return "\n".join(lines) if len(lines) > 2 else ""
 
 
 def _axis(rows, axis) -> str:
@@ -129,7 +140,7 @@ def _axis(rows, axis) -> str:
         for value in values:
             row = next((x for x in found if x["opponent"] == name and x[axis] == value), None)
             about = "≈ " if row and row["done"] < row["batch"] else ""
-            cells.append("" if row is None else f"{about}{1e6 * row['median'] / row['done']:.4g}")
+            cells.append("" if row is None else f"{about}{number(1e6 * row['median'] / row['done'])}")
         lines.append("| " + " | ".join([name, *cells]) + " |")
     return "\n".join(lines)
 

@@ -52,7 +52,7 @@ def rows():
         row(FAST, 2e-4, axis="batch", batch=1),
         row(PLAIN, 1e-4, axis="batch", batch=1),
         row("frax", 1.0) | {"missing": "not installed: no such module"},
-        {"kind": "memory", "peak_bytes": 2**31},
+        {"kind": "memory", "rollouts": 4096, "peak_bytes": 2**31},
     ]
 
 
@@ -75,6 +75,7 @@ def test_targets_are_ratios_of_the_times_of_one_rollout(rows):
     assert (gradient.value, gradient.verdict) == (None, UNKNOWN)
     assert (pytest.approx(kernel.value), kernel.verdict) == (1e-4 / 3e-5, HOLDS)
     assert (pytest.approx(one.value), one.verdict) == (0.5, FAILS)
+    assert "4,096" in memory.name
     assert (memory.value, memory.verdict) == (2.0, HOLDS)
 
 

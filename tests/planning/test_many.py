@@ -3,41 +3,35 @@
 from __future__ import annotations
 
 import csv
+from pathlib import Path
 
 import chex
 import jax
 import numpy as np
 import pytest
+from planar_problems import SETTINGS, plan_in_chunks, planar, planar_problems
 from scipy.io import loadmat
-from wu6_problems import limited, wu6_problem
+from virtual_devices import output_of
+from wu6_problems import limited
 
 from jffsr.errors import InputError
-from jffsr.optimizers.registry import Settings
+from jffsr.planning import many
 from jffsr.planning.many import plan_many
 from jffsr.planning.plan import solve
 from jffsr.planning.result import ResultCode
 
-SETTINGS = Settings(particles=6, evaluations=30)
+
+@pytest.fixture(scope="module")
+def problems(robots):
+    return planar_problems(robots["hu_2011_planar2"])
 
 
 @pytest.fixture(scope="module")
-def robot(robots):
-    return limited(robots["hu_2011_planar2"])
+def plans(problems):
+    return plan_in_chunks(problems, seed=3)
 
 
-def planar(robot, duration: float, **keywords):
-    return wu6_problem(
-        robot, 16, duration, start=np.array([1.5, 0.5]), goal=np.array([-1.0, 1.5]), **keywords
-    )
-
-
-@pytest.fixture(scope="module")
-def problems(robot):
-    return [planar(robot, duration) for duration in (20.0, 25.0, 31.0)]
-
-
-def test_a_batch_is_planned_and_judged_like_single_plans(problems):
-    plans = plan_many(problems, "qpso", SETTINGS, seed=3)
+def test_a_batch_is_planned_and_judged_like_single_plans(problems, plans):
     chex.assert_shape(plans.free, (3, 4))
     chex.assert_shape(plans.motion.base_quaternion, (3, 17, 4))
     chex.assert_tree_all_finite(plans.cost)
@@ -50,8 +44,56 @@ def test_a_batch_is_planned_and_judged_like_single_plans(problems):
     assert len(set(np.asarray(plans.cost).tolist())) == 3
 
 
-def test_problems_of_other_structure_are_refused(problems, robot):
-    other = planar(robot, 20.0, excursion_limit=None)
+def test_plans_do_not_depend_on_the_devices(plans):
+    """Three plans, two at a time, on four devices."""
+    found = output_of(Path(__file__).parent / "plans_on_four_devices.py", devices=4)
+    there = [np.array(numbers) for numbers in found["numbers"]]
+    here = [plans.free, plans.cost, plans.motion.base_quaternion]
+    chex.assert_trees_all_close(there, here, rtol=1e-12, atol=1e-12)
+    assert found["programs"] == 1
+
+
+@pytest.mark.parametrize("chunks_before_the_kill", [1, 2])
+def test_a_killed_batch_goes_on_to_the_same_bits(
+    chunks_before_the_kill, problems, plans, tmp_path, monkeypatch
+):
+    path, save, saved = tmp_path / "plans.npz", many.save_plans, []
+
+    def save_then_die(*arguments):
+        save(*arguments)
+        saved.append(path.stat().st_size)
+        if len(saved) == chunks_before_the_kill:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(many, "save_plans", save_then_die)
+        with pytest.raises(KeyboardInterrupt):
+            plan_in_chunks(problems, seed=3, checkpoint=path)
+    chunks = []
+    with monkeypatch.context() as patch:
+        patch.setattr(many, "save_plans", lambda *arguments: chunks.append(save(*arguments)))
+        again = plan_in_chunks(problems, seed=3, checkpoint=path)
+    assert len(chunks) == 2 - chunks_before_the_kill
+    chex.assert_trees_all_equal(again, plans)
+    assert many._plan_chunk._cache_size() == 1
+
+
+def test_a_checkpoint_of_others_is_refused(problems, plans, tmp_path, robots):
+    path = tmp_path / "plans.npz"
+    plan_in_chunks(problems, seed=3, checkpoint=path)
+    other = planar(limited(robots["hu_2011_planar2"]), 20.5)
+    for arguments in ({"seed": 4}, {"problems": [other, *problems[1:]]}):
+        with pytest.raises(InputError, match="is of other problems"):
+            plan_in_chunks(**{"problems": problems, "seed": 3, "checkpoint": path, **arguments})
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(InputError, match="cannot be read"):
+        plan_in_chunks(problems, seed=3, checkpoint=path)
+    with pytest.raises(InputError, match="chunk is 0"):
+        plan_many(problems, chunk=0)
+
+
+def test_problems_of_other_structure_are_refused(problems, robots):
+    other = planar(limited(robots["hu_2011_planar2"]), 20.0, excursion_limit=None)
     with pytest.raises(InputError, match="problem 3 differs from problem 0"):
         plan_many([*problems, other], "qpso", SETTINGS)
     with pytest.raises(InputError, match="no problem"):
