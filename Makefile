@@ -21,11 +21,11 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-distributed lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' Makefile
 
 venv: $(STAMP)  ## make the environment, or bring it up to date
 
@@ -41,6 +41,9 @@ check-slow: $(STAMP)  ## run the heavier checks
 check-physics: $(STAMP)  ## check 1,000 random robots against MuJoCo and the laws of mechanics
 	$(VENV_PYTHON) tests/physics/check_physics.py
 	$(PYTEST) -m physics $(PYTEST_ARGS)
+
+check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
+	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)
 
 lint: $(STAMP)  ## check style and format
 	$(VENV_PYTHON) -m ruff check .
