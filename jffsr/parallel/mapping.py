@@ -76,17 +76,25 @@ def spread(
         return _in_chunks(function, batch, chunk, memory)
     each = math.ceil(count / devices)
 
-    def here(part: Any) -> Any:
-        results = _in_chunks(function, part, chunk, memory)
-        if together:
-            results = jax.tree.map(lambda x: jax.lax.all_gather(x, axes, tiled=True), results)
-        return results
+    batch = _padded(batch, each * devices)
+    if together:
+        # The batch comes in whole, else the compiler might keep what it was made from in parts.
+        sharded = _on_each(partial(_own_share, function, chunk, memory, each, axes), PartitionSpec())
+    else:
+        sharded = _on_each(lambda part: _in_chunks(function, part, chunk, memory), PartitionSpec(axes))
+    return _cut(sharded(batch), count)
 
-    split = PartitionSpec(axes)
-    sharded = jax.shard_map(
-        here, in_specs=split, out_specs=PartitionSpec() if together else split, check_vma=False
-    )
-    return _cut(sharded(_padded(batch, each * devices)), count)
+
+def _on_each(function: Callable[[Any], Any], layout: PartitionSpec) -> Callable[[Any], Any]:
+    return jax.shard_map(function, in_specs=layout, out_specs=layout, check_vma=False)
+
+
+def _own_share(function, chunk, memory, each: int, axes: tuple[str, ...], batch: Any) -> Any:
+    """All results, of which this device makes the `each` that are its own."""
+    start = each * jax.lax.axis_index(axes)
+    part = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, start, each), batch)
+    results = _in_chunks(function, part, chunk, memory)
+    return jax.tree.map(lambda x: jax.lax.all_gather(x, axes, tiled=True), results)
 
 
 _within: ContextVar[bool] = ContextVar("within a spread function", default=False)

@@ -16,7 +16,7 @@ from jffsr.optimizers.interface import FunctionProblem
 from jffsr.optimizers.registry import Settings, build_phases
 
 SETTINGS = Settings(
-    particles=5, swarm_evaluations=20, starts=3, gradient_iterations=3, polish_iterations=2, memory=3
+    particles=8, swarm_evaluations=24, starts=3, gradient_iterations=3, polish_iterations=2, memory=3
 )
 
 
@@ -38,6 +38,7 @@ def search(resume_at: int | None = None):
     outcome = driver.run(
         build_phases("hybrid", SETTINGS), problem, jax.random.key(1), chunk=2, on_chunk=snapshots.append
     )
+    assert all(leaf.is_fully_replicated for snap in snapshots for leaf in jax.tree.leaves(snap.state))
     if resume_at is None:
         return outcome
     kept = snapshots[resume_at]
