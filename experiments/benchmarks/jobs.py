@@ -9,6 +9,7 @@ from experiments.benchmarks.opponents import registry as r
 from experiments.benchmarks.planning_work import GENERATION, INDEX_GRADIENT, VALUE
 
 EVERYONE = tuple(r.OPPONENTS)
+TWISTS = tuple(name for name in EVERYONE if name != r.SHARED)  # one evaluation is the same in both ways
 MAIN = (r.FAST, r.PLAIN, r.OBVIOUS, r.PINOCCHIO, r.SHARED, r.KERNEL)
 REFERENCE = Case()
 PLANNING = (VALUE, INDEX_GRADIENT, GENERATION)
@@ -24,34 +25,38 @@ class Job:
     axis: str = ""
 
 
-def jobs(all_cores: bool, quick: bool) -> list[Job]:
-    """The list for one process; quick leaves most of the axes out."""
+def groups(all_cores: bool, quick: bool) -> list[list[Job]]:
+    """The list for one process; jobs of a group are timed in turn, so that ratios between them are fair.
+
+    quick leaves most of the axes out.
+    """
+    single = REFERENCE.varied(precision=FLOAT32)
     if all_cores:
         # The engines called from Python, and the libraries that only give a mass matrix, are not faster here.
-        found = [Job(r.ROLLOUT, REFERENCE, MAIN), *(Job(work, REFERENCE, (r.FAST,)) for work in PLANNING)]
+        found = [
+            [Job(r.ROLLOUT, REFERENCE, MAIN), Job(r.ROLLOUT, single, (r.FAST,), "precision")],
+            [Job(work, REFERENCE, (r.FAST,)) for work in PLANNING],
+        ]
         if not quick:
-            found.append(Job(r.ROLLOUT, REFERENCE.varied(batch=16384), (r.FAST, r.KERNEL), "batch"))
-            found.append(Job(r.GRADIENT, REFERENCE, (r.FAST,)))
-            found.append(Job(r.ROLLOUT, REFERENCE.varied(precision=FLOAT32), (r.FAST,), "precision"))
+            found.append([Job(r.ROLLOUT, REFERENCE.varied(batch=16384), (r.FAST, r.KERNEL), "batch")])
+            found.append([Job(r.GRADIENT, REFERENCE, (r.FAST,))])
         return found
     found = [
-        Job(r.ROLLOUT, REFERENCE, EVERYONE),
-        Job(r.ROLLOUT, REFERENCE.varied(precision=FLOAT32), (r.FAST, r.OBVIOUS), "precision"),
-        Job(r.ROLLOUT, REFERENCE.varied(batch=1), MAIN, "batch"),
-        *(Job(work, REFERENCE, (r.FAST, r.PLAIN)) for work in PLANNING),
-        Job(r.TWIST, REFERENCE.varied(batch=ONE_EVALUATION), EVERYONE),
+        [Job(r.ROLLOUT, REFERENCE, EVERYONE), Job(r.ROLLOUT, single, (r.FAST, r.OBVIOUS), "precision")],
+        [Job(r.ROLLOUT, REFERENCE.varied(batch=1), MAIN, "batch")],
+        [Job(work, REFERENCE, (r.FAST, r.PLAIN)) for work in PLANNING],
+        [Job(r.TWIST, REFERENCE.varied(batch=ONE_EVALUATION), TWISTS)],
     ]
     if quick:
         return found
-    found.append(Job(r.GRADIENT, REFERENCE, (r.FAST, r.PLAIN, r.OBVIOUS, r.DIFFRAX)))
-    found.append(Job(r.GRADIENT, REFERENCE.varied(precision=FLOAT32), (r.FAST,), "precision"))
-    for batch in BATCHES:
-        if batch not in (1, REFERENCE.batch):
-            found.append(Job(r.ROLLOUT, REFERENCE.varied(batch=batch), MAIN, "batch"))
-    for steps in STEPS:
-        if steps != REFERENCE.steps:
-            found.append(Job(r.ROLLOUT, REFERENCE.varied(steps=steps), MAIN, "steps"))
-    for name in ROBOTS.values():
-        if name != REFERENCE.robot_name:
-            found.append(Job(r.ROLLOUT, REFERENCE.varied(robot_name=name), MAIN, "robot"))
+    found.append(
+        [
+            Job(r.GRADIENT, REFERENCE, (r.FAST, r.PLAIN, r.OBVIOUS, r.DIFFRAX)),
+            Job(r.GRADIENT, single, (r.FAST,), "precision"),
+        ]
+    )
+    cases = [("batch", REFERENCE.varied(batch=batch)) for batch in BATCHES if batch != 1]
+    cases += [("steps", REFERENCE.varied(steps=steps)) for steps in STEPS]
+    cases += [("robot", REFERENCE.varied(robot_name=name)) for name in ROBOTS.values()]
+    found += [[Job(r.ROLLOUT, case, MAIN, axis)] for axis, case in cases if case != REFERENCE]
     return found

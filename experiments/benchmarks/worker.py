@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import time
+from collections.abc import Iterator
 
 # The two imports set nothing and start nothing: affinity and devices come first.
 import jax
@@ -13,7 +14,7 @@ import jax
 import jffsr
 from experiments.benchmarks.ceiling import peak
 from experiments.benchmarks.checking import agrees, difference
-from experiments.benchmarks.jobs import REFERENCE, Job, jobs
+from experiments.benchmarks.jobs import REFERENCE, Job, groups
 from experiments.benchmarks.machine import describe_device
 from experiments.benchmarks.opponents import c_kernel
 from experiments.benchmarks.opponents.program import Program, Unsupported
@@ -33,16 +34,25 @@ def main() -> None:
         os.sched_setaffinity(0, allowed[:1])
     jax.config.update("jax_enable_x64", True)
     write(kind="device", cores="all" if all_cores else "one", threads=threads, **describe_device())
-    for job in jobs(all_cores, quick):
-        measure(job, threads, quick)
+    for group in groups(all_cores, quick):
+        measure(group, threads, quick)
     if jax.default_backend() == "cpu":
         write(kind="peak", threads=threads, operations_per_second=peak(threads))
         write(kind="operations", rollout=c_kernel.operations(REFERENCE))
 
 
-def measure(job: Job, threads: int, quick: bool) -> None:
-    """Check that all agree, time them in turn, write a line for each."""
-    programs, rows, reference = {}, {}, None
+def measure(group: list[Job], threads: int, quick: bool) -> None:
+    """Check that all of a job agree, time the group in turn, write a line for each."""
+    ready = [pair for job in group for pair in prepared(job, threads)]
+    programs = {str(place): program for place, (program, _) in enumerate(ready)}
+    for (_, row), timing in zip(ready, timed(programs, 3 if quick else 7).values(), strict=True):
+        write(**row, median=timing.median, best=timing.best, samples=len(timing.samples))
+        say(f"{label(row)}: {row['opponent']} {1e6 * timing.median / row['done']:.4g} us each")
+
+
+def prepared(job: Job, threads: int) -> Iterator[tuple[Program, dict]]:
+    """The programs of a job that agree with the first, and what is known of each; the others are written down."""
+    reference = None
     for name in job.opponents:
         row = {
             "kind": "measurement", "work": job.work, "axis": job.axis, "opponent": name, "threads": threads,
@@ -57,7 +67,7 @@ def measure(job: Job, threads: int, quick: bool) -> None:
             if OPPONENTS[name].own:
                 raise
             write(**row, missing=reason(error))
-            say(f"{job.work}: {name}: {reason(error)}")
+            say(f"{label(row)}: {name}: {reason(error)}")
             continue
         if reference is None:
             reference = result
@@ -66,15 +76,11 @@ def measure(job: Job, threads: int, quick: bool) -> None:
             row["agrees"] = agrees(row["difference"], job.case.precision, job.case.steps)
             if not row["agrees"]:
                 write(**row, missing=f"not timed: differs by {row['difference']:.1e}")
-                say(f"{job.work}, {label(job)}: {name} differs by {row['difference']:.1e}")
+                say(f"{label(row)}: {name} differs by {row['difference']:.1e}")
                 continue
         row |= {"done": program.batch or job.case.batch, "compile": program.compile_seconds}
-        programs[name], rows[name] = program, row
-        say(f"{job.work}, {label(job)}: {name} ready after {time.perf_counter() - started:.1f} s")
-    for name, timing in timed(programs, 3 if quick else 7).items():
-        row = rows[name]
-        write(**row, median=timing.median, best=timing.best, samples=len(timing.samples))
-        say(f"{job.work}, {label(job)}: {name} {1e6 * timing.median / row['done']:.4g} us each")
+        say(f"{label(row)}: {name} ready after {time.perf_counter() - started:.1f} s")
+        yield program, row
 
 
 def build(job: Job, name: str, threads: int) -> Program:
@@ -87,10 +93,9 @@ def build(job: Job, name: str, threads: int) -> Program:
     return opponent.program(job.work, job.case, threads)
 
 
-def label(job: Job) -> str:
-    """A case in a few words."""
-    case = job.case
-    return f"{case.robot_name}, {case.batch} x {case.steps}, {case.precision}"
+def label(row: dict) -> str:
+    """Work and case in a few words."""
+    return f"{row['work']}, {row['robot']}, {row['batch']} x {row['steps']}, {row['precision']}"
 
 
 def reason(error: Exception) -> str:

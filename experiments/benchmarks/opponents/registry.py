@@ -58,6 +58,8 @@ class Opponent:
 
         make = called if getattr(module, "IN_CHUNKS", False) else compiled
         if work == TWIST:
+            if not (hasattr(module, "twists") or hasattr(module, "twist")):
+                raise Unsupported("an integrator: it has no base twist of its own")
             many = module.twists(case) if hasattr(module, "twists") else jax.vmap(module.twist(case))
             return compiled(many, *case.postures, batch=case.batch, precision_name=case.precision)
         final = module.final_attitude(case)
