@@ -1,7 +1,7 @@
 """How many candidates are evaluated at once on one device.
 
 On a CPU a batch is fastest while what it works on stays near the core: rollouts of a seven-axis arm over 200 steps
-(0.23 MB each) run fastest 16 at a time. On an accelerator many have to be under way at once, and memory is the limit.
+(0.22 MB each) run fastest 8 at a time. On an accelerator many have to be under way at once, and memory is the limit.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import math
 
 import jax
 
-CPU_BYTES = 4 * 2**20
+CPU_BYTES = 2 * 2**20
 """Default limit on a CPU: what was fastest where a core has 1 MiB of second-level and a share of third-level cache."""
-CPU_WHOLE = 4
+CPU_WHOLE = 8
 """A batch of up to so many times that limit is not divided: a loop costs more than the slower memory."""
 LANES = 8
 """Candidates that fill a vector register on a CPU; with fewer at once the rest of it would be idle."""
