@@ -31,8 +31,9 @@ def draw(rows: list[dict], path: Path) -> None:
     ]
     figure, axes = plt.subplots(1, 3, figsize=(13, 4.4), constrained_layout=True, width_ratios=(1.25, 1, 1))
     _bars(axes[0], measured)
-    _lines(axes[1], measured, "batch", "rollouts at once")
-    _lines(axes[2], measured, "steps", "steps")
+    _lines(axes[1], measured, "batch", "200 steps, by batch")
+    _lines(axes[2], measured, "steps", "batch 1,024, by steps")
+    figure.suptitle("Rollouts of a seven-joint arm, float64", fontsize=11)
     lines, names = axes[1].get_legend_handles_labels()
     if lines:
         axes[2].legend(lines, names, frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -54,14 +55,13 @@ def _bars(axes, measured: list[dict]) -> None:
             axes.plot(many[name], place, marker="|", markersize=14, markeredgewidth=2.5, color="white")
             axes.plot(many[name], place, marker="|", markersize=14, markeredgewidth=1.2, color="black")
     axes.set_yticks(range(len(names)), names, fontsize=9)
-    axes.set(xscale="log", xlim=(min(one.values()) / 3, max(one.values()) * 6))
-    axes.set_xlabel("microseconds a rollout")
-    title = "seven joints, 200 steps, batch 1,024: one core"
-    axes.set_title(title + (" (mark: all)" if many else ""), fontsize=10)
+    axes.set(xscale="log", xlim=(min([*one.values(), *many.values()]) / 2, max(one.values()) * 8))
+    axes.set_xlabel("microseconds a rollout, one core" + (" (mark: all cores)" if many else ""))
+    axes.set_title("200 steps, batch 1,024", fontsize=10)
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _lines(axes, measured: list[dict], axis: str, label: str) -> None:
+def _lines(axes, measured: list[dict], axis: str, title: str) -> None:
     rows = [x for x in measured if x["threads"] == 1 and x["axis"] in ("", axis)]
     rows = [x for x in rows if x["robot"] == ROBOTS["seven joints"]]
     for name, (colour, dashes, mark) in STYLES.items():
@@ -77,7 +77,11 @@ def _lines(axes, measured: list[dict], axis: str, label: str) -> None:
             )
     axes.set_visible(bool(axes.lines))
     axes.set(xscale="log", yscale="log")
-    axes.set_xlabel(label)
+    values = sorted({x[axis] for x in rows})
+    axes.set_xticks(values, [f"{value:,}" for value in values])
+    axes.minorticks_off()
+    axes.set_xlabel("rollouts at once" if axis == "batch" else "steps")
+    axes.set_title(title, fontsize=10)
     axes.set_ylabel("microseconds a rollout, one core")
     axes.grid(True, which="major", color="#e4e4e4", linewidth=0.7)
     axes.set_axisbelow(True)
