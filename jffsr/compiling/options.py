@@ -20,7 +20,7 @@ if jax.__version_info__ < (0, 11):
 
 # The code generator's own optimisations are half of what compiling takes. Without them a program runs about four
 # times longer, which does not matter to one that runs once, in some milliseconds.
-ONCE = {**(OPTIONS or {}), "xla_backend_optimization_level": 0}
+ONCE = {**OPTIONS, "xla_backend_optimization_level": 0}
 
 jit = partial(jax.jit, compiler_options=OPTIONS)
 """`jax.jit`, to be used the same way, for whatever runs or differentiates a rollout."""
