@@ -75,7 +75,7 @@ clean:  ## remove the environment, caches and build products (never runs/)
 	find jffsr tests experiments -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 
 # An environment is always made whole, so that nothing of the last one stays behind; a folder that is not one is
-# left alone.
+# left alone. Sources are translated here, for where PYTHONDONTWRITEBYTECODE is set, every start would do so again.
 $(STAMP): pyproject.toml constraints.txt
 	@case "$(PYTHON_VERSION)" in 3.11.*|3.12.*|3.13.*) ;; *) \
 	    echo "jffsr needs Python 3.11, 3.12 or 3.13, but $(PYTHON) is $(or $(PYTHON_VERSION),missing or broken): name another one, for example make $(or $(MAKECMDGOALS),venv) PYTHON=python3.12" >&2; \
@@ -87,9 +87,10 @@ $(STAMP): pyproject.toml constraints.txt
 	@set -e; \
 	if [ -n "$(UV)" ]; then \
 	    "$(UV)" venv --quiet --python "$(PYTHON_PATH)" "$(VENV)"; \
-	    "$(UV)" pip install --quiet --python "$(VENV_PYTHON)" -e '.[test]' -c constraints.txt; \
+	    "$(UV)" pip install --quiet --compile-bytecode --python "$(VENV_PYTHON)" -e '.[test]' -c constraints.txt; \
 	else \
 	    "$(PYTHON_PATH)" -m venv "$(VENV)"; \
 	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check -e '.[test]' -c constraints.txt; \
 	fi
+	@"$(VENV_PYTHON)" -m compileall -q jffsr || true
 	@touch $@

@@ -32,9 +32,7 @@ class Unnamed(Exception):
     """Something has no name that would stay the same in another process and change with its meaning."""
 
 
-def digest(
-    function: Callable, options: dict | None, static: list[Any], dynamic: list[Any], mesh: Mesh
-) -> str:
+def digest(function: Callable, options: dict, static: list[Any], dynamic: list[Any], mesh: Mesh) -> str:
     """The name of a program, hexadecimal; Unnamed where it depends on what cannot be told by name."""
     leaves, structure = jax.tree.flatten(dynamic)
     types, values = [jax.typeof(leaf) for leaf in leaves], jax.config.values

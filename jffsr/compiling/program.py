@@ -18,6 +18,7 @@ from functools import partial, update_wrapper, wraps
 from typing import Any
 
 import jax
+import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 from jffsr.compiling import store
@@ -58,6 +59,8 @@ class Program:
 
     def __call__(self, *args: Any) -> Any:
         """The function's value."""
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(args)):
+            return self._function(*args)
         signature = self._signature(args)
         if signature is None:
             return self._jit(*args)
@@ -81,6 +84,10 @@ class Program:
             future = _workers.submit(self._obtain_as, args, bool(jax.config.jax_enable_x64), _mesh())
             self._compiled[signature] = future
         return future
+
+    def shape(self, *args: Any) -> Any:
+        """Shapes and types of the value, traced at most once for arguments of the same form."""
+        return self._jit.eval_shape(*args)
 
     def _wait(self, signature: Hashable, args: tuple[Any, ...]) -> Callable[..., Any]:
         with self._lock:
@@ -132,7 +139,7 @@ class Program:
         return lowered.compile() if name is None else store.compile_and_save(name, lowered, self._options)
 
     def _signature(self, args: tuple[Any, ...]) -> Hashable | None:
-        """What the compiled form depends on; None where `jax.jit` has to do it (traced, or on other devices)."""
+        """What the compiled form depends on; None where `jax.jit` has to do it (debugging, other devices)."""
         if jax.config.jax_disable_jit or jax.config.jax_debug_nans or jax.config.jax_debug_infs:
             return None
         if jax.config.jax_default_device is not None:
@@ -185,13 +192,13 @@ def _shape(everywhere: NamedSharding, leaf: Any) -> jax.ShapeDtypeStruct:
 
 def _is_plain(leaf: Any, homes: set[jax.Device]) -> bool:
     """Whether a leaf is a value, or the shape of one, that is to be had from these devices."""
-    if isinstance(leaf, jax.core.Tracer):
-        return False
     if not isinstance(leaf, jax.Array):
         return True
     return leaf.sharding.device_set <= homes | {jax.local_devices()[0]}
 
 
 def _type(leaf: Any) -> tuple[tuple[int, ...], Any, bool]:
+    if isinstance(leaf, np.ndarray):
+        return leaf.shape, leaf.dtype, False
     kind = jax.typeof(leaf)
     return kind.shape, kind.dtype, getattr(kind, "weak_type", False)

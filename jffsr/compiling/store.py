@@ -38,7 +38,7 @@ def open_store(folder: Path | None) -> None:
 
 
 def name_of(
-    function: Callable, options: dict | None, static: list[Any], dynamic: list[Any], mesh: Mesh
+    function: Callable, options: dict, static: list[Any], dynamic: list[Any], mesh: Mesh
 ) -> str | None:
     """The name of a program's compiled form; None where it is not kept.
 
@@ -71,14 +71,14 @@ def load(name: str, mesh: Mesh) -> Callable[..., Any] | None:
     return executable
 
 
-def compile_and_save(name: str, lowered: jax.stages.Lowered, options: dict | None) -> Callable[..., Any]:
+def compile_and_save(name: str, lowered: jax.stages.Lowered, options: dict) -> Callable[..., Any]:
     """Compile, and keep the compiled form under a name."""
     _loaded_by_jax.flag = False
     executable = lowered.compile()
     if _loaded_by_jax.flag:
         # What JAX's own cache has loaded cannot be written out again: XLA keeps its object code no longer. An
         # option that means nothing here, and that no one else sets, makes JAX compile.
-        executable = lowered.compile(compiler_options={**(options or {}), **_INERT})
+        executable = lowered.compile(compiler_options={**options, **_INERT})
     try:
         _write(_path(name), zlib.compress(pickle.dumps(serialize_executable.serialize(executable)), level=1))
     except Exception as error:

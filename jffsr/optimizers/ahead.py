@@ -13,6 +13,11 @@ from jffsr.parallel.devices import all_devices
 from jffsr.types import Array
 
 
+@jax.jit
+def _population(optimizer, state):
+    return optimizer.population(state)
+
+
 def prepare_run(
     phases: list[Phase],
     problem: OptimizationProblem,
@@ -37,11 +42,9 @@ def _prepared(
     for index in range(first, len(phases)):
         optimizer, stop = phases[index].optimizer, phases[index].stop
         start = (optimizer, problem, jax.random.fold_in(key, index), population)
-        state = jax.eval_shape(driver._init.__wrapped__, *start)
-        if index == first and resume:
-            state = resume.state
+        state = resume.state if resume and index == first else driver._init.shape(*start)
         prepared.append(driver._advance_jit.prepare(optimizer, problem, state, stop, chunk))
         if index > first:
             prepared.append(driver._init.prepare(*start))
-        population = jax.eval_shape(optimizer.population, state)
+        population = _population.eval_shape(optimizer, state)
     return [future for future in prepared if future is not None]

@@ -148,10 +148,15 @@ def solve(
     )
 
 
+@jax.jit
+def _bounds(problem: Problem):
+    return problem.bounds()
+
+
 def _prepare_review(problem: Problem, step_factor: int, with_sensitivity: bool) -> list[Future]:
     """Begin to compile, in threads, what follows the search."""
     with jax.enable_x64(True):
-        free = jax.ShapeDtypeStruct(jax.eval_shape(problem.bounds)[0].shape, float)
+        free = jax.ShapeDtypeStruct(_bounds.eval_shape(problem)[0].shape, float)
         prepared = [_verified.prepare(problem, free, step_factor)]
         if with_sensitivity:
             prepared.append(prepare_sensitivity(problem, free))

@@ -68,13 +68,15 @@ def result_code(
 
 
 def settled(best_values: Array) -> Array:
-    """Whether the last tenth of a search's steps (K,) bettered its index by no more than 1 %."""
-    best_values = jnp.asarray(best_values)
+    """Whether the last tenth of a search's steps (K,) bettered its index by no more than 1 %.
+
+    Host arrays stay on the host: the number of steps differs from plan to plan, and each would be compiled for.
+    """
     steps = best_values.shape[0]
     if steps < 2:
-        return jnp.array(False)
+        return np.array(False)
     earlier, last = best_values[-1 - max(1, steps // 10)], best_values[-1]
-    return jnp.isfinite(earlier) & (earlier - last <= 0.01 * jnp.abs(earlier))
+    return (abs(earlier) < np.inf) & (earlier <= last + 0.01 * abs(earlier))
 
 
 _KINDS = ("position", "rate", "acceleration", "excursion")

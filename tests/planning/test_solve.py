@@ -129,6 +129,22 @@ def test_other_numbers_share_the_compiled_programs(robot):
         assert outcome.cost == pytest.approx(sum(float(t.weighted) for t in outcome.terms.values()), rel=1e-9)
 
 
+@pytest.mark.parametrize("count", [50, pytest.param(1000, marks=pytest.mark.slow)])
+def test_many_plans_of_one_robot_compile_nothing_again(robot, plan, count):
+    """Tasks, durations, masses and seeds vary; budgets, being traced, are cut to a few evaluations."""
+    few = replace(SETTINGS, swarm_evaluations=8, gradient_iterations=1, polish_iterations=1)
+    draw = np.random.default_rng(0)
+    for seed in range(count):
+        other = robot.replace(mass=np.asarray(robot.mass) * draw.uniform(0.5, 2.0, robot.mass.shape))
+        problem = wu6_problem(
+            other, num_steps=20, duration=draw.uniform(25, 40), start=START + draw.normal(0, 0.02, 6)
+        )
+        found = solve(problem, "hybrid", few, seed=seed, chunk=6, tolerances=COARSE)
+        # What was traced would have been compiled, and counted here.
+        assert found.seconds["compile"] == 0
+        assert np.isfinite(found.cost)
+
+
 def test_too_coarse_a_grid_is_not_verified(problem, plan):
     """Violent free numbers in twenty steps: the finer run ends elsewhere."""
     wild = np.tile([2.5, -2.5], 6)

@@ -1,0 +1,106 @@
+"""Programs: the same values as the function, one trace a form, compiled in threads or on the spot."""
+
+from __future__ import annotations
+
+import threading
+
+import chex
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jffsr.compiling import Program
+from jffsr.compiling.program import is_waiting, seconds_waited
+
+
+def scaled(tree, power):
+    return {name: 2.0 * value**power for name, value in tree.items()}
+
+
+def test_values_and_traces():
+    program = Program(chex.assert_max_traces(scaled, n=3), static_argnums=1)
+    for number in (1.0, 3.0):
+        found = program({"a": np.full(3, number), "b": number}, 2)
+        chex.assert_shape(found["a"], (3,))
+        np.testing.assert_array_equal(found["a"], np.full(3, 2 * number**2))
+        assert found["b"] == 2 * number**2
+    np.testing.assert_array_equal(program({"a": np.ones(3), "b": 1.0}, 3)["a"], 2.0)
+    assert program({"a": np.ones(2)}, 2)["a"].shape == (2,)
+    with pytest.raises(AssertionError, match="assert_max_traces"):
+        program({"a": np.ones(4)}, 2)
+
+
+def test_prepared_for_shapes_it_is_traced_once():
+    program = Program(chex.assert_max_traces(scaled, n=1), static_argnums=1)
+    shapes = {"a": jax.ShapeDtypeStruct((3,), float)}
+    future = program.prepare(shapes, 2)
+    assert program.prepare(shapes, 2) is None
+    np.testing.assert_array_equal(program({"a": np.ones(3)}, 2)["a"], 2.0)
+    assert future.done()
+    assert program.shape({"a": np.ones(3)}, 2)["a"].shape == (3,)
+
+
+def test_waiting_is_counted_and_a_ready_program_adds_nothing():
+    waiting = []
+    program = Program(lambda x: waiting.append(is_waiting()) or x + 1)
+    before = seconds_waited()
+    program(1.0)
+    first = seconds_waited()
+    program(2.0)
+    assert waiting == [True]
+    assert seconds_waited() == first > before
+    assert not is_waiting()
+
+
+def test_a_thread_has_the_precision_that_was_asked_for():
+    program = Program(lambda: jnp.zeros(1))
+    with jax.enable_x64(False):
+        program.prepare()
+        assert program().dtype == np.float32
+    assert program().dtype == np.float64
+
+
+def test_what_fails_in_a_thread_is_told_to_the_caller_each_time():
+    def broken(x):
+        raise ZeroDivisionError("no such thing")
+
+    program = Program(broken)
+    program.prepare(1.0).exception()
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError, match="no such thing"):
+            program(1.0)
+
+
+def test_one_that_waits_its_turn_is_compiled_by_the_caller():
+    """With every thread busy, or after the future was cancelled, nothing is waited for."""
+    let_go, begun = threading.Event(), threading.Semaphore(0)
+
+    def slow(x):
+        begun.release()
+        let_go.wait(60)
+        return x
+
+    busy = [Program(slow).prepare(np.zeros(size)) for size in (1, 2)]
+    for _ in busy:
+        assert begun.acquire(timeout=60)
+    try:
+        queued, cancelled = Program(jnp.sin), Program(jnp.cos)
+        future = queued.prepare(0.0)
+        assert cancelled.prepare(0.0).cancel()
+        assert (queued(0.0), cancelled(0.0)) == (0.0, 1.0)
+        assert future.cancelled()
+    finally:
+        let_go.set()
+        for future in busy:
+            future.result(60)
+
+
+def test_traced_arguments_and_other_settings_are_left_to_jax():
+    program = Program(lambda x: x**2)
+    np.testing.assert_array_equal(jax.vmap(program)(np.arange(3.0)), [0.0, 1.0, 4.0])
+    assert jax.grad(program)(3.0) == 6.0
+    with jax.disable_jit():
+        assert program(3.0) == 9.0
+    with jax.debug_nans(True), pytest.raises(FloatingPointError), np.errstate(all="ignore"):
+        Program(lambda x: x / x)(np.float64(0.0))
