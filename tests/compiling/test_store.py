@@ -60,6 +60,14 @@ def test_a_folder_that_has_gone_is_no_hindrance(folder):
     np.testing.assert_allclose(Program(quaternion_multiply)(TURN, TURN)[0], np.cos(1.0))
 
 
+def test_within_a_mesh_they_are_kept_for_it(folder, monkeypatch):
+    with jax.set_mesh(jax.make_mesh((1,), ("batch",), (jax.sharding.AxisType.Auto,))):
+        made = Program(quaternion_multiply)(TURN, TURN)
+        found = untraceable(Program(quaternion_multiply), monkeypatch)(TURN, TURN)
+    assert made.sharding.mesh.axis_names == found.sharding.mesh.axis_names == ("batch",)
+    np.testing.assert_array_equal(found, made)
+
+
 def own(x):
     return x + 1
 
@@ -67,13 +75,13 @@ def own(x):
 def test_a_users_function_is_not_kept(folder, robots):
     assert Program(own)(1.0) == 2.0
     assert Program(lambda x: x)(1.0) == 1.0
-    assert store.name_of(quaternion_multiply, OPTIONS, [own], [TURN]) is None
+    assert store.name_of(quaternion_multiply, OPTIONS, [own], [TURN], jax.sharding.get_mesh()) is None
     assert list(folder.iterdir()) == []
 
 
 def test_names_tell_apart_what_differs(robots):
     def name(*dynamic, function=quaternion_multiply, options=OPTIONS, static=()):
-        return digest(function, options, list(static), list(dynamic))
+        return digest(function, options, list(static), list(dynamic), jax.sharding.get_mesh())
 
     robot: Robot = robots["hu_2011_planar2"]
     heavier = robot.replace(mass=np.asarray(robot.mass) * 2)
@@ -94,6 +102,8 @@ def test_names_tell_apart_what_differs(robots):
         name(TURN, static=["1"]),
     ]
     with jax.enable_x64(False):
+        names.append(name(TURN))
+    with jax.set_mesh(jax.make_mesh((1,), ("batch",), (jax.sharding.AxisType.Auto,))):
         names.append(name(TURN))
     assert len(set(names)) == len(names)
 
