@@ -75,4 +75,7 @@ def count_devices(axes: tuple[str, ...]) -> int:
 def on_all_devices(tree: Any) -> Any:
     """The arrays with a copy on every device of the mesh in use, as compiled programs give them back."""
     mesh = jax.sharding.get_mesh()
-    return tree if mesh.empty else jax.device_put(tree, NamedSharding(mesh, PartitionSpec()))
+    if mesh.empty:
+        return tree
+    # A compiled copy, because `jax.device_put` reaches no device of another process.
+    return jax.jit(lambda whole: whole, out_shardings=NamedSharding(mesh, PartitionSpec()))(tree)
