@@ -88,5 +88,5 @@ def test_chunks_are_alike_and_keep_to_the_limit(candidates):
         assert chunk * item <= CPU_WHOLE * CPU_BYTES or chunk <= LANES
         limited = chunk_size(candidates, item, memory=2_000_000)
         assert limited * item <= 2_000_000 or limited == 1
-    assert chunk_size(65_536, 230_000) == 16
-    assert chunk_size(65_536, 1_100_000) == LANES
+    assert chunk_size(65_536, 30_000) == 32
+    assert chunk_size(65_536, 230_000) == chunk_size(65_536, 1_100_000) == LANES
