@@ -32,11 +32,11 @@ def map_batch(
 
     batch is a pytree with a leading axis (K, ...) on every array; so is the result. The function is vectorized over
     `chunk` candidates at a time on each device; without it the chunk follows from `memory`, a limit in bytes on what
-    one device holds beside the batch and the results (by default a few MiB on a CPU, which is fastest, and a share
-    of the memory of other devices). The devices are those of the mesh in use (`jax.set_mesh`), else all. The function
-    is compiled once for each function object and each shape; differentiate it inside, not outside:
-    `map_batch(jax.grad(f), batch)`. Raises InputError for a batch without a common leading axis, or a chunk or
-    memory that is not positive.
+    one device holds beside the batch and the results (by default 2 MiB, and at least 8 candidates, on a CPU, which is
+    fastest, and a share of the memory of other devices). The devices are those of the mesh in use (`jax.set_mesh`),
+    else all. The function is compiled once for each function object and each shape; differentiate it inside, not
+    outside: `map_batch(jax.grad(f), batch)`. Raises InputError for a batch without a common leading axis, or a chunk
+    or memory that is not positive.
     """
     _check(batch, chunk, memory)
     if transforming():
