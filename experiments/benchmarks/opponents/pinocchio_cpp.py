@@ -27,7 +27,7 @@ def rollouts(case: Case, threads: int, shared: bool = False) -> Program:
         )  # fmt: skip
         return out
 
-    return Program(run, seconds)
+    return Program(run, seconds, case.batch)
 
 
 def twists(case: Case, threads: int) -> Program:
@@ -42,7 +42,7 @@ def twists(case: Case, threads: int) -> Program:
         )
         return out
 
-    return Program(run, seconds)
+    return Program(run, seconds, case.batch)
 
 
 @cache
