@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from time_limit import within
 
 import jffsr
 from jffsr.study.dataset import open_dataset
@@ -78,6 +79,13 @@ def finish(processes: list[subprocess.Popen], seconds: float = 600) -> list[int]
             process.wait()
 
 
+def wait_for_checkpoint(folder: Path, processes: list[subprocess.Popen]) -> None:
+    with within(300):
+        while not (folder / "checkpoint.npz").is_file():
+            assert all(process.poll() is None for process in processes), "ended before it was stopped"
+            time.sleep(0.02)
+
+
 def assert_same_result(one: Path, other: Path) -> None:
     first, second = (open_dataset(folder / "result.nc") for folder in (one, other))
     assert set(first) == set(second)
@@ -114,11 +122,7 @@ def test_killed_on_the_way_they_go_on_to_the_same_end(killed, long_alone, tmp_pa
     folder = tmp_path / "run"
     processes = start_two(folder, LONG)
     try:
-        waited = time.monotonic()
-        while not (folder / "checkpoint.npz").is_file():
-            assert all(process.poll() is None for process in processes), "ended before it was killed"
-            assert time.monotonic() - waited < 300
-            time.sleep(0.02)
+        wait_for_checkpoint(folder, processes)
         for i in killed:
             processes[i].send_signal(signal.SIGKILL)
     finally:
@@ -133,11 +137,12 @@ def test_killed_on_the_way_they_go_on_to_the_same_end(killed, long_alone, tmp_pa
 def test_ctrl_c_to_one_stops_all_with_a_checkpoint(tmp_path):
     folder = tmp_path / "run"
     processes = start_two(folder, LONG)
-    waited = time.monotonic()
-    while not (folder / "checkpoint.npz").is_file() and time.monotonic() - waited < 300:
-        time.sleep(0.02)
-    processes[1].send_signal(signal.SIGINT)
-    assert finish(processes) == [130, 130]
+    try:
+        wait_for_checkpoint(folder, processes)
+        processes[1].send_signal(signal.SIGINT)
+    finally:
+        statuses = finish(processes)
+    assert statuses == [130, 130]
     assert (folder / "checkpoint.npz").is_file()
 
 
