@@ -108,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     show = commands.add_parser(
         "show",
         help="print a finished run and draw its figures",
-        description="Print a finished run and draw it.",
+        description="Print a finished run and draw it, as .png and, for a paper, as .pdf.",
     )
     show.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
     show.set_defaults(command=_show)
@@ -159,7 +159,8 @@ def _run(arguments: argparse.Namespace) -> int:
     elif config.output.figures:
         from jffsr.viz.run import draw_run
 
-        draw_run(run.folder.path)
+        # The fonts of the PDFs take as long as all else that is drawn: those are for `jffsr show`.
+        draw_run(run.folder.path, ["png"])
     print(summary_text(run.summary))
     print(f"  folder        {run.folder.path}")
     return _status(run)

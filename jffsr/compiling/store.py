@@ -59,8 +59,9 @@ def load(name: str, mesh: Mesh) -> Callable[..., Any] | None:
     devices = jax.local_devices()[:1] if mesh.empty else list(mesh.devices.flat)
     path = _path(name)
     try:
-        _find_lapack()
-        parts = pickle.loads(zlib.decompress(path.read_bytes()))
+        calls_lapack, *parts = pickle.loads(zlib.decompress(path.read_bytes()))
+        if calls_lapack:
+            _find_lapack()
         executable = serialize_executable.deserialize_and_load(*parts, execution_devices=devices)
         os.utime(path)
     except FileNotFoundError:
@@ -80,7 +81,8 @@ def compile_and_save(name: str, lowered: jax.stages.Lowered, options: dict) -> C
         # option that means nothing here, and that no one else sets, makes JAX compile.
         executable = lowered.compile(compiler_options={**options, **_INERT})
     try:
-        _write(_path(name), zlib.compress(pickle.dumps(serialize_executable.serialize(executable)), level=1))
+        parts = ("lapack" in lowered.as_text(), *serialize_executable.serialize(executable))
+        _write(_path(name), zlib.compress(pickle.dumps(parts), level=1))
     except Exception as error:
         _logger.debug("%s is not kept: %s", name, error)
     return executable

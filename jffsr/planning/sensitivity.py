@@ -1,6 +1,6 @@
 """How a finished plan answers to errors in the masses and inertias that it was made with.
 
-One reverse-mode Jacobian of the plan's motion, run again as the planner ran it: the joints follow the same law,
+One forward-mode Jacobian of the plan's motion, run again as the planner ran it: the joints follow the same law,
 and a wrong mass or inertia shows in where the base and the tool end. The published index has corners where its
 norms are zero, which is where an optimizer ends; so the derivative of the index is that of its smooth form.
 """
@@ -153,7 +153,7 @@ def _jacobian(problem: Problem, free: Vector) -> tuple[Inertials, PlanEnd]:
     robot = problem.robot
     inertia = jnp.asarray(robot.inertia)
     nominal = Inertials(jnp.asarray(robot.mass), inertia[:, _ROWS, _COLUMNS])
-    return nominal, jax.jacrev(lambda inertials: _plan_end(problem, free, inertials))(nominal)
+    return nominal, jax.jacfwd(lambda inertials: _plan_end(problem, free, inertials))(nominal)
 
 
 def _plan_end(problem: Problem, free: Vector, inertials: Inertials) -> PlanEnd:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import lru_cache
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -60,7 +60,7 @@ def describe_robot(name: str | Path, trail: Trail | None = None) -> RobotDescrip
         return model.describe(text, trail.arms_of(text, os.path.realpath(path), path.parent, describe_robot))
     if suffix in XML_SUFFIXES:
         return _describe_xml(Path(name), text)
-    catalogue = _catalogue()
+    catalogue = _by_file_name(text) or _catalogue()
     aliases = {alias: key for key, model in catalogue.items() for alias in model.aliases}
     key = text if text in catalogue else aliases.get(text)
     if key is not None:
@@ -98,14 +98,21 @@ def _data() -> Path:
     return Path(str(resources.files("jffsr.robots"))) / "data"
 
 
-@lru_cache(maxsize=1)
 def _catalogue() -> dict[str, RobotModel]:
-    models = {}
-    for entry in _data().iterdir():
-        if entry.name.endswith(".yaml"):
-            model = _parse(entry.read_text(encoding="utf-8"), entry.name)
-            models[model.name] = model
-    return models
+    models = (_entry(path.stem) for path in _data().iterdir() if path.suffix == ".yaml")
+    return {model.name: model for model in models}
+
+
+def _by_file_name(name: str) -> dict[str, RobotModel]:
+    """The part of the catalogue that a robot is found in without reading all files: its own, named after it."""
+    own = name.isidentifier() and _exists(str(_data() / f"{name}.yaml"))
+    return {name: _entry(name)} if own else {}
+
+
+@cache
+def _entry(stem: str) -> RobotModel:
+    file = f"{stem}.yaml"
+    return _parse((_data() / file).read_text(encoding="utf-8"), file)
 
 
 def _parse(text: str, origin: str) -> RobotModel:

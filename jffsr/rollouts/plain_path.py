@@ -1,7 +1,7 @@
 """The joint terms of a rollout as the textbook has them: from the inertia blocks of every point of the grid.
 
-Umetani and Yoshida 1989, with the linear momentum eliminated by hand. Ten times as slow as `hot_path`, whose test it
-is, and independent of it.
+Umetani and Yoshida 1989, with the linear momentum eliminated by hand. Some twenty times as slow as `hot_path` (a
+rollout of seven axes, batches of 8, one core: 868 instead of 38 us), whose test it is, and independent of it.
 """
 
 from __future__ import annotations

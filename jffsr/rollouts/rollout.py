@@ -6,6 +6,7 @@ from numbers import Integral
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING, base_freedom
 from jffsr.errors import InputError
@@ -49,8 +50,8 @@ def rollout(
     trajectory's own. Of the initial state only the base pose is read: the joints are the trajectory's.
     base_mode (static) is floating; attitude_held, where only P is conserved and L is not used; or fixed, where
     the base stands still whatever the momentum. kernel (static) is fast, or plain for the textbook's evaluation
-    of the inertias, which gives the same and takes ten times as long. Raises InputError for another base_mode or
-    kernel, for num_steps that is no positive whole number, and for want of a duration.
+    of the inertias, which gives the same and takes some twenty times as long. Raises InputError for another base_mode
+    or kernel, for num_steps that is no positive whole number, and for want of a duration.
     """
     grid = sample_joints(trajectory, check_duration(trajectory, duration), check_steps(num_steps))
     return rollout_grid(robot, grid, initial_state, momentum, base_mode, kernel)
@@ -158,10 +159,10 @@ def _integrate_attitude(
     # as long, its gradient 11 times.
     barrier = jax.lax.optimization_barrier
 
-    def rate(stage: Array, q):
+    def rate(stage: tuple[Array, ...], q):
         w, x, y, z = q
-        spin = symmetric_times(tuple(stage[:6]), rows_transposed_times(quaternion_rows(q), momentum))
-        ox, oy, oz = barrier(subtract(spin, tuple(stage[6:])))
+        spin = symmetric_times(stage[:6], rows_transposed_times(quaternion_rows(q), momentum))
+        ox, oy, oz = barrier(subtract(spin, stage[6:]))
         return (
             0.5 * (-x * ox - y * oy - z * oz),
             0.5 * (w * ox + y * oz - z * oy),
@@ -184,8 +185,12 @@ def _integrate_attitude(
         q = tuple(a / length for a in q)
         return q, q
 
-    packed = barrier(jnp.stack([*terms.inverse_inertia, *terms.joint_rate], axis=-1))
-    stages = (packed[:-1:2], packed[1::2], packed[2::2])
+    # Array by array: a batch of rollouts is then beside each other in memory at each step, as the loop reads it.
+    # Packed in one array, its numbers were gathered one by one.
+    sampled = (*terms.inverse_inertia, *terms.joint_rate)
+    stages = barrier(
+        tuple(tuple(x[part] for x in sampled) for part in (np.s_[:-1:2], np.s_[1::2], np.s_[2::2]))
+    )
     start = tuple(initial)
     _, later = jax.lax.scan(advance, start, stages)
     return tuple(jnp.concatenate([a[None], b]) for a, b in zip(start, later, strict=True))

@@ -6,7 +6,7 @@ import importlib
 import threading
 
 _DATA = ("xarray", "h5netcdf")
-_FIGURES = ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "jffsr.viz.run")
+_FIGURES = ("matplotlib.backends.backend_agg", "jffsr.viz.run")
 
 
 def import_early(figures: bool) -> threading.Thread:

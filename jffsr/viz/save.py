@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -23,11 +23,17 @@ from jffsr.viz.style import styled
 if TYPE_CHECKING:
     from xarray import Dataset
 
+# Without a date the same run gives the same bytes.
+_UNDATED = {"png": {"Software": None}, "pdf": {"CreationDate": None}}
+KINDS = tuple(_UNDATED)
+"""The forms of a figure: to look at, and for a paper."""
 _PICTURE_DPI = 160
 
 
-def save_figures(robot: Robot, dataset: Dataset, folder: str | Path) -> list[Path]:
-    """Write joints, base, convergence and robot as .png (200 dpi) and .pdf into `folder`; their paths.
+def save_figures(
+    robot: Robot, dataset: Dataset, folder: str | Path, kinds: Sequence[str] = KINDS
+) -> list[Path]:
+    """Write joints, base, convergence and robot as .png (200 dpi) and .pdf, or one of them, into `folder`; their paths.
 
     dataset is a run's result.nc. The folder is made where it is missing. A file appears whole or not at all.
     """
@@ -39,17 +45,16 @@ def save_figures(robot: Robot, dataset: Dataset, folder: str | Path) -> list[Pat
         "convergence": draw_convergence(dataset),
         "robot": draw_robot(robot, dataset),
     }
-    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name)]
+    return [path for name, figure in figures.items() for path in save_figure(figure, folder / name, kinds)]
 
 
 @styled
-def save_figure(figure: Figure, stem: Path) -> list[Path]:
+def save_figure(figure: Figure, stem: Path, kinds: Sequence[str] = KINDS) -> list[Path]:
     """Write a figure to `stem`.png and `stem`.pdf, each beside its place and then moved; their paths."""
     paths = []
-    # Without a date the same run gives the same bytes.
-    for kind, metadata in (("png", {"Software": None}), ("pdf", {"CreationDate": None})):
+    for kind in kinds:
         path = stem.with_name(f"{stem.name}.{kind}")
-        _whole(path, partial(figure.savefig, format=kind, metadata=metadata))
+        _whole(path, partial(figure.savefig, format=kind, metadata=_UNDATED[kind]))
         paths.append(path)
     return paths
 

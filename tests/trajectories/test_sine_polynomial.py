@@ -200,3 +200,12 @@ def test_it_is_a_pytree_of_numbers():
     law = SinePolynomial.between(START, GOAL, LOWER, UPPER, DURATION)
     assert len(jax.tree.leaves(law)) == len(dataclasses.fields(law)) - 1
     chex.assert_trees_all_equal(jax.jit(lambda x: x)(law), law)
+
+
+def test_a_grid_of_times_is_the_same_times_one_by_one(laws):
+    law, times = jax.tree.map(lambda x: x[0], laws), np.linspace(0, DURATION, 9)
+    together, apart = jax.jit(lambda law: (law.on_grid(times), [law(time) for time in times]))(law)
+    for kind in range(3):
+        chex.assert_shape(together[kind], (3, 9))
+        one_by_one = np.stack([sample[kind] for sample in apart], axis=-1)
+        np.testing.assert_allclose(together[kind], one_by_one, atol=1e-14)

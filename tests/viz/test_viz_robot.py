@@ -101,6 +101,12 @@ def test_files_are_written_whole(planar2, tmp_path):
         assert len(content) > 5000
 
 
+def test_only_the_forms_asked_for_are_written(planar2, tmp_path):
+    paths = save_figures(planar2, run_dataset(joints=2), tmp_path, ["png"])
+    assert len(paths) == 4
+    assert {path.suffix for path in tmp_path.iterdir()} == {".png"}
+
+
 def test_a_figure_that_fails_leaves_no_file(tmp_path, monkeypatch):
     def fail(*args):
         raise OSError("disk full")
