@@ -11,6 +11,7 @@ from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.joint_torque import with_joint_torque
 from jffsr.rollouts.kernels import FAST
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
@@ -49,7 +50,7 @@ class Problem:
     def motion(self, candidate: Vector) -> Motion:
         """The motion under the free numbers (k,)."""
         trajectory = self.trajectory.with_free(candidate)
-        return rollout(
+        motion = rollout(
             self.robot,
             trajectory,
             self.initial_state,
@@ -58,6 +59,7 @@ class Problem:
             base_mode=self.base_mode,
             kernel=self.kernel,
         )
+        return with_joint_torque(self.robot, motion) if self.objective.needs_torque else motion
 
     def value(self, candidate: Vector) -> Scalar:
         """The published index."""
