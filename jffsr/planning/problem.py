@@ -59,7 +59,9 @@ class Problem:
             base_mode=self.base_mode,
             kernel=self.kernel,
         )
-        return with_joint_torque(self.robot, motion) if self.objective.needs_torque else motion
+        if not self.objective.needs_torque:
+            return motion
+        return with_joint_torque(self.robot, motion, self.kernel)
 
     def value(self, candidate: Vector) -> Scalar:
         """The published index."""

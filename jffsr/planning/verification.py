@@ -14,6 +14,7 @@ from jffsr.planning.problem import Problem
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.conservation import momentum_drift
 from jffsr.rollouts.joint_torque import with_joint_torque
+from jffsr.rollouts.kernels import PLAIN
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.reference import reference_rollout
 from jffsr.spatial.rotation import (
@@ -73,7 +74,7 @@ def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[M
         base_mode=problem.base_mode,
     )
     if problem.objective.needs_torque:
-        finer = with_joint_torque(problem.robot, finer)
+        finer = with_joint_torque(problem.robot, finer, PLAIN)
     common = finer.base_quaternion[::step_factor]
     error = quaternion_multiply(quaternion_conjugate(common), motion.base_quaternion)
     angle = jnp.linalg.norm(quaternion_to_rotation_vector(error), axis=-1)
@@ -113,8 +114,7 @@ def _overruns(robot: Robot, objective: CompositeIndex, motion: Motion) -> Overru
             angles = attitude_angles(motion, term.measure)
             excursion = jnp.max(jnp.abs(angles), axis=0) / term.limit - 1
         if isinstance(term, JointTorque):
-            torques = with_joint_torque(robot, motion).joint_torque
-            torque = jnp.max(jnp.abs(torques), axis=0) / term.limit - 1
+            torque = jnp.max(jnp.abs(motion.joint_torque), axis=0) / term.limit - 1
     return Overruns(
         position=jnp.max(beyond, axis=0) / half,
         rate=jnp.max(jnp.abs(grid.joint_velocity), axis=0) / limits.velocity - 1,

@@ -16,14 +16,30 @@ from jffsr.dynamics.equations_of_motion import inverse_dynamics
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.hot_torque import hot_joint_torque
+from jffsr.rollouts.kernels import FAST, PLAIN, check_kernel
 from jffsr.rollouts.motion import Motion
 from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.types import Array, Quaternion, Twist, Vector
 
 
-def joint_torque(robot: Robot, motion: Motion) -> Array:
-    """Joint torques (N + 1, n), N m or N, at a motion's samples, under its own base_mode and momentum."""
+def joint_torque(robot: Robot, motion: Motion, kernel: str = FAST) -> Array:
+    """Joint torques (N + 1, n), N m or N, at a motion's samples, under its own base_mode and momentum.
 
+    kernel (static) is fast, or plain for the textbook's inverse dynamics of each sample, which gives the same. Raises
+    InputError for another.
+    """
+    return _KERNELS[check_kernel(kernel)](robot, motion)
+
+
+def with_joint_torque(robot: Robot, motion: Motion, kernel: str = FAST) -> Motion:
+    """The motion with its joint torques in it, so that they are computed once for all that reads them."""
+    if motion.joint_torque is not None:
+        return motion
+    return replace(motion, joint_torque=joint_torque(robot, motion, kernel))
+
+
+def _plain_joint_torque(robot: Robot, motion: Motion) -> Array:
     def at(quaternion: Quaternion, twist: Twist, q: Vector, qd: Vector, qdd: Vector) -> Vector:
         spin = quaternion_to_matrix(quaternion).T @ twist[3:]
         kin = kinematics(robot, State(jnp.zeros(3), jnp.array([1.0, 0.0, 0.0, 0.0]), q))
@@ -39,10 +55,4 @@ def joint_torque(robot: Robot, motion: Motion) -> Array:
     )
 
 
-def with_joint_torque(robot: Robot, motion: Motion) -> Motion:
-    """The motion with its joint torques in it, so that they are computed once for all that reads them."""
-    return (
-        motion
-        if motion.joint_torque is not None
-        else replace(motion, joint_torque=joint_torque(robot, motion))
-    )
+_KERNELS = {FAST: hot_joint_torque, PLAIN: _plain_joint_torque}

@@ -33,12 +33,13 @@ def evaluated(problem):
 
     def both(free):
         motion = problem.motion(free)
-        integral = term.smooth(problem.robot, motion, problem.objective.smoothing.loosened(0.2))
-        return jax.numpy.stack([integral, final_angle(motion)]), motion
+        smooth = term.smooth(problem.robot, motion, problem.objective.smoothing.loosened(0.2))
+        smooth_and_angle = jax.numpy.stack([smooth, final_angle(motion)])
+        return smooth_and_angle, (term.value(problem.robot, motion), smooth_and_angle)
 
     def all_of(free):
-        (smooth_and_angle, motion), jacobian = both(free), jax.jacrev(lambda x: both(x)[0])(free)
-        return term.value(problem.robot, motion), smooth_and_angle, jacobian
+        jacobian, (integral, smooth_and_angle) = jax.jacrev(both, has_aux=True)(free)
+        return integral, smooth_and_angle, jacobian
 
     return jit(all_of)
 

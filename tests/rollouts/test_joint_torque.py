@@ -12,6 +12,7 @@ import pytest
 
 from jffsr.crosscheck.mujoco_model import to_mjmodel
 from jffsr.dynamics.base_mode import BASE_MODES
+from jffsr.errors import InputError
 from jffsr.robots.loading import load_robot
 from jffsr.robots.state import State
 from jffsr.rollouts.joint_torque import joint_torque, with_joint_torque
@@ -85,7 +86,14 @@ def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
         np.testing.assert_allclose(getattr(driven, name), getattr(planned, name)[::2], rtol=0, atol=3e-7)
 
 
+def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions):
+    motion = motions["floating"]
+    plain = jax.jit(joint_torque, static_argnums=2)(robot, motion, "plain")
+    np.testing.assert_allclose(motion.joint_torque, plain, rtol=0, atol=1e-10)
+
+
 def test_torques_that_a_motion_carries_are_not_computed_again(robot, motions):
     motion = motions["floating"]
     assert with_joint_torque(robot, motion) is motion
-    np.testing.assert_allclose(joint_torque(robot, motion), motion.joint_torque, rtol=0, atol=1e-12)
+    with pytest.raises(InputError, match="kernel"):
+        joint_torque(robot, motion, "quick")
