@@ -1,8 +1,9 @@
 """Joint torques of a whole motion by a recursion made for the compiler: the hot path of the torque terms.
 
-`joint_torque(..., kernel="plain")` gives the same by the readable inverse dynamics, and is its test; this takes a
-quarter of its time, and of its gradient's a fifth. The layout is that of `hot_path`: body frames turned so that z is the
-joint's axis, every component an array over the samples, an unbranched part of the tree one loop. Two things differ:
+`joint_torque(..., kernel="plain")` gives the same by the readable inverse dynamics, and is its test. Of that one's time
+this takes a third, of its gradient's a sixth (six axes, 101 samples, float64, batches of 25: 78 us instead of 254, 0.27
+instead of 1.65 ms). The layout is that of `hot_path`: body frames turned so that z is the joint's axis, every component
+an array over the samples, an unbranched part of the tree one loop. Two things are particular to it:
 
 * The base's acceleration is not solved for at each sample. It is the time derivative of what the rollout knows anyway:
   of w_B = I_B^-1 (R' L - h_B), and of the centre of mass that moves on a straight line. One forward derivative of the

@@ -12,6 +12,7 @@ import pytest
 from hu_problems import hu_problem
 from scipy.spatial.transform import Rotation
 
+from jffsr.compiling import ONCE
 from jffsr.objectives.composite import CompositeIndex
 from jffsr.objectives.smoothing import Smoothing
 from jffsr.objectives.terms import JointPosition
@@ -171,7 +172,8 @@ def test_gradients_of_all_terms_through_a_motion_are_the_differences():
     index = CompositeIndex(plain.objective.terms + extra)
     assert index.needs_torque
     problem = replace(plain, objective=index)
-    values_and_gradients = jax.jit(jax.vmap(jax.value_and_grad(lambda z: problem.smooth_and_value(z)[0])))
+    smooth_and_gradient = jax.value_and_grad(lambda z: problem.smooth_and_value(z)[0])
+    values_and_gradients = jax.jit(jax.vmap(smooth_and_gradient), compiler_options=ONCE)
     h, rng = 1e-4, np.random.default_rng(2)
     points = np.concatenate([np.zeros((1, 4)), rng.uniform(-1, 1, (3, 4))])
     steps = np.concatenate([sign * k * h * np.eye(4) for k in (1, 2) for sign in (1, -1)])

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from jffsr.compiling import ONCE
 from jffsr.crosscheck.mujoco_model import to_mjmodel
 from jffsr.dynamics.base_mode import BASE_MODES
 from jffsr.errors import InputError
@@ -43,7 +44,7 @@ def motions(robot):
         motion = rollout(robot, LAW, START, num_steps=STEPS, momentum=MOMENTUM, base_mode=mode)
         return with_joint_torque(robot, motion)
 
-    return jax.jit(lambda: {mode: one(mode) for mode in BASE_MODES})()
+    return jax.jit(lambda: {mode: one(mode) for mode in BASE_MODES}, compiler_options=ONCE)()
 
 
 def test_mujoco_accelerates_under_them_as_the_motion_does(robot, motions):
@@ -88,7 +89,7 @@ def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
 
 def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions):
     motion = motions["floating"]
-    plain = jax.jit(joint_torque, static_argnums=2)(robot, motion, "plain")
+    plain = jax.jit(joint_torque, static_argnums=2, compiler_options=ONCE)(robot, motion, "plain")
     np.testing.assert_allclose(motion.joint_torque, plain, rtol=0, atol=1e-10)
 
 
