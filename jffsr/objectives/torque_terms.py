@@ -188,7 +188,8 @@ class TorqueLimit:
     """Constraint: no joint's torque exceeds `limit` (n,), N m or N, infinite where there is none."""
 
     limit: Vector
-    width: Array = field(default_factory=lambda: np.array(1e-3))
+    width: Array | float = 5e-4
+    tolerance: Array | float = 1e-3
     name: str = field(default="torque_limit", metadata={"static": True})
     needs_torque = True
 
