@@ -148,8 +148,8 @@ def table(facts: dict, rows: list[dict]) -> str:
     seeds = len({row["seed"] for row in rows})
     lines = [
         f"{seeds} seeds, {facts['free']} free numbers, a gradient charged {facts['gradient_cost']:.2f} evaluations; "
-        f"{machine['processor']}, {machine['cores']} cores, JAX {machine['versions']['jax']}. Medians over the seeds but "
-        "where said; the last column is the evaluations charged until J is within 1 % of where that run ends.",
+        f"{machine['processor']}, {machine['cores']} cores, JAX {machine['versions']['jax']}. Medians over the seeds "
+        "but where said; the last column is the evaluations charged until J is within 1 % of where that run ends.",
         "",
         "| search | J median | quartiles | best | worst | torque integral [N m s] | abs. final angle [deg] | peak rate "
         "[rad/s] | peak acceleration [rad/s^2] | charged | within 1 % after |",
