@@ -153,7 +153,7 @@ def test_the_overrun_of_positions_is_relative_to_half_the_range(make_motion):
         grid = replace(motion.joint_grid, joint_position=q)
         return term.smooth(ROBOT, replace(motion, joint_grid=grid), Smoothing())
 
-    gradient = jax.grad(smooth)(jnp.asarray(q))
+    gradient = jax.jit(jax.grad(smooth))(jnp.asarray(q))
     chex.assert_tree_all_finite(gradient)
     np.testing.assert_allclose(gradient.sum(axis=0), [1 / 1.5, -0.5, 0, -1], rtol=0, atol=1e-6)
 

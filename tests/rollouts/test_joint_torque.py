@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -87,10 +88,18 @@ def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
         np.testing.assert_allclose(getattr(driven, name), getattr(planned, name)[::2], rtol=0, atol=3e-7)
 
 
-def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions):
+@pytest.mark.parametrize("kinds", ["as they are", "all slide"])
+def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions, kinds):
+    """On a tree whose joints turn, slide, and do both in one unbranched part."""
     motion = motions["floating"]
-    plain = jax.jit(joint_torque, static_argnums=2, compiler_options=ONCE)(robot, motion, "plain")
-    np.testing.assert_allclose(motion.joint_torque, plain, rtol=0, atol=1e-10)
+    if kinds == "all slide":
+        robot = robot.replace(topology=replace(robot.topology, joint_types=("prismatic",) * 4))
+    both = jax.jit(
+        lambda r: [joint_torque(r, motion, kernel) for kernel in ("fast", "plain")], compiler_options=ONCE
+    )
+    fast, plain = both(robot)
+    np.testing.assert_allclose(fast, plain, rtol=0, atol=1e-10)
+    assert np.ptp(plain, axis=0).min() > 0.01
 
 
 def test_torques_that_a_motion_carries_are_not_computed_again(robot, motions):

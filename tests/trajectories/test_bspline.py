@@ -17,7 +17,7 @@ from jffsr.trajectories.interface import PlannedTrajectory
 
 START, GOAL = np.array([-1.5, 1.2, 0.3]), np.array([2.5, -0.5, 3.9])
 DURATION = 7.0
-SIZES = [(3, 7, True), (3, 9, True), (4, 8, True), (4, 8, False), (4, 5, False), (5, 12, True), (6, 7, False)]
+SIZES = [(3, 7, True), (4, 8, True), (4, 8, False), (4, 5, False), (5, 12, True)]
 
 
 def random_spline(degree=4, count=8, goal=True, **keywords):
@@ -119,12 +119,12 @@ def test_gradients_are_finite_at_every_knot_and_right():
         times = jnp.asarray(np.unique(law.knots)) * law.duration
         return sum(jnp.sum(jnp.sin(x)) for x in law.on_grid(times))
 
-    gradient = jax.jit(jax.grad(loss))(law)
+    gradient, value = jax.jit(jax.grad(loss))(law), jax.jit(loss)
     chex.assert_tree_all_finite(gradient)
     step = 1e-6
     for index in ((0, 0), (1, 2)):
         moved = [law.inner.copy() + sign * step * _unit(law.inner.shape, index) for sign in (1, -1)]
-        ahead, behind = (float(loss(law.with_free(np.append(x.ravel(), DURATION)))) for x in moved)
+        ahead, behind = (float(value(law.with_free(np.append(x.ravel(), DURATION)))) for x in moved)
         np.testing.assert_allclose(gradient.inner[index], (ahead - behind) / (2 * step), rtol=0, atol=1e-7)
 
 

@@ -20,7 +20,7 @@ ENDS = {
     "goal_acceleration": np.array([-0.2, 0.15, 0.1]),
 }
 DURATION = 7.0
-DEGREES = (5, 6, 7, 9, 12)
+DEGREES = (5, 6, 9, 12)
 
 
 def random_law(degree, **ends):
@@ -100,7 +100,7 @@ def test_gradients_with_respect_to_everything_are_finite():
     def loss(law):
         return sum(jnp.sum(x**2) for share in (0.0, 0.5, 1.0) for x in law(share * law.duration))
 
-    chex.assert_tree_all_finite(jax.grad(loss)(law))
+    chex.assert_tree_all_finite(jax.jit(jax.grad(loss))(law))
 
 
 @pytest.mark.parametrize(
