@@ -12,6 +12,7 @@ from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.joint_torque import with_joint_torque
 from jffsr.rollouts.kernels import FAST
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
@@ -52,8 +53,9 @@ class Problem:
     def motion(self, candidate: Vector, robot: Robot | None = None) -> Motion:
         """The motion under the free numbers (k,), of another robot where one is given."""
         trajectory = self.trajectory.with_free(candidate)
-        return rollout(
-            self.robot if robot is None else robot,
+        robot = self.robot if robot is None else robot
+        motion = rollout(
+            robot,
             trajectory,
             self.initial_state,
             num_steps=self.num_steps,
@@ -61,6 +63,9 @@ class Problem:
             base_mode=self.base_mode,
             kernel=self.kernel,
         )
+        if not self.objective.needs_torque:
+            return motion
+        return with_joint_torque(robot, motion, self.kernel)
 
     def value(self, candidate: Vector) -> Scalar:
         """The published index, or its measure over the uncertain robots."""

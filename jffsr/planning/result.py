@@ -13,6 +13,9 @@ from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
 from jffsr.types import Array
 
+LIMIT_KINDS = ("position", "rate", "acceleration", "excursion", "torque")
+"""The limits that a plan is held to, as the fields of `Overruns` name them."""
+
 
 class ResultCode(IntEnum):
     """0 is the only success."""
@@ -52,7 +55,7 @@ def result_code(
     problem: Problem, verification: Verification, converged: Array, tolerances: Tolerances
 ) -> Array:
     """The code as an int32 array; works under vmap. `converged` is whether the search had come to its end."""
-    largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in _KINDS]))
+    largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in LIMIT_KINDS]))
     finite = jnp.isfinite(verification.cost) & jnp.isfinite(verification.measure)
     verified = (
         (verification.attitude_difference <= tolerances.attitude)
@@ -77,9 +80,6 @@ def settled(best_values: Array) -> Array:
         return np.array(False)
     earlier, last = best_values[-1 - max(1, steps // 10)], best_values[-1]
     return (abs(earlier) < np.inf) & (earlier <= last + 0.01 * abs(earlier))
-
-
-_KINDS = ("position", "rate", "acceleration", "excursion")
 
 
 def explain(code: int, problem: Problem, verification: Verification, tolerances: Tolerances) -> Result:
@@ -140,7 +140,7 @@ def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[
 
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:
     """Each limit that is overrun by more than the tolerance, with its joint or axis and by how much."""
-    for kind in _KINDS:
+    for kind in LIMIT_KINDS:
         names = "xyz" if kind == "excursion" else problem.robot.joint_names
         of = "base attitude excursion about" if kind == "excursion" else f"{kind} of"
         for name, overrun in zip(names, np.asarray(getattr(overruns, kind)), strict=True):

@@ -7,8 +7,8 @@ of one core of a processor with AVX-512, a seven-axis arm, float64, an evaluatio
   the joints further out are all that counts: 15 numbers pass from body to body, and no pose or velocity of a body
   is ever formed. That is less than half of the operations of a sum over bodies in the base frame (with polynomials
   for sine and cosine 7,700 rollouts of 200 steps a second on two cores, instead of 1,800).
-* Each body's frame is turned so that z is its joint's axis (`_Inwards`): the joint's turn is then a plane rotation,
-  and its rate adds three products to the momentum.
+* Each body's frame is turned so that z is its joint's axis (`JointConstants`): the joint's turn is then a plane
+  rotation, and its rate adds three products to the momentum.
 * Every component is an array over the grid, so that each operation is one long loop that the compiler can put into
   vector registers (`spatial.components`), of 512 bits (`jffsr.compiling`: 100 ns instead of 128); sine and cosine
   are polynomials (`spatial.trigonometry`: under 5 ns for both instead of 18).
@@ -89,7 +89,7 @@ class _Carried(NamedTuple):
     angular: Components
 
 
-class _Inwards(NamedTuple):
+class JointConstants(NamedTuple):
     """Constants of the joints, leaves (n, ...): the way from each body's frame to that of its parent.
 
     Frames are the bodies' own, turned so that z is the joint's axis. mass (n,), first (n, 3) and inertia
@@ -104,13 +104,13 @@ class _Inwards(NamedTuple):
     offset: Array
 
 
-def _constants(robot: Robot) -> _Inwards:
+def joint_constants(robot: Robot) -> JointConstants:
     mass, com = jnp.asarray(robot.mass)[1:], jnp.asarray(robot.link_com)
     turned = frame_along(jnp.asarray(robot.joint_axis))
     before = jnp.concatenate([jnp.eye(3, dtype=turned.dtype)[None], turned])[np.array(robot.topology.parents)]
     about_joint = jnp.asarray(robot.inertia)[1:] + mass[:, None, None] * parallel_axis(com)
     inertia = jnp.einsum("nji,njk,nkl->nil", turned, about_joint, turned)
-    return _Inwards(
+    return JointConstants(
         mass=mass,
         first=jnp.einsum("nji,nj->ni", turned, mass[:, None] * com),
         inertia=jnp.stack(symmetric_elements(inertia), axis=-1),
@@ -121,11 +121,11 @@ def _constants(robot: Robot) -> _Inwards:
 
 def _inwards(robot: Robot, q: Array, qd: Array) -> _Carried:
     """What the base carries, about its centre of mass and in its frame, at joint positions and rates (n, G)."""
-    topology, constants = robot.topology, _constants(robot)
+    topology, constants = robot.topology, joint_constants(robot)
     zero = jnp.zeros_like(q[0])
     nothing = _Carried(jnp.zeros_like(constants.mass[0]), (zero,) * 3, (zero,) * 6, (zero,) * 3, (zero,) * 3)
     on_body: dict[int, list[_Carried]] = {}
-    for root, joints in reversed(_segments(topology)):
+    for root, joints in reversed(unbranched_parts(topology)):
         turning = topology.is_revolute[list(joints)]
         index = np.array(joints[::-1])
         inputs = jax.tree.map(lambda x, index=index: x[index], (constants, q, qd))
@@ -138,7 +138,7 @@ def _inwards(robot: Robot, q: Array, qd: Array) -> _Carried:
     return _sum(on_body[0])
 
 
-def _segments(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
+def unbranched_parts(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
     """Unbranched parts of the tree: the body that each hangs from, and its joints from there outwards."""
     children: dict[int, list[int]] = {}
     for joint, parent in enumerate(topology.parents):
@@ -161,7 +161,7 @@ def _sum(parts: list[_Carried]) -> _Carried:
     return jax.tree.map(lambda *x: sum(x[1:], start=x[0]), *parts)
 
 
-def _step(carried: _Carried, body: _Inwards, q: Array, qd: Array, turns=None, *, kind=None) -> _Carried:
+def _step(carried: _Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> _Carried:
     """Take up one body and pass its joint: from about the outer joints to about the parent's frame.
 
     kind says whether the joint turns (else it slides); None leaves it to `turns`, a traced flag.

@@ -14,6 +14,7 @@ from jffsr.writing import write_atomically
 
 _attitude_angles = Program(attitude_angles, static_argnums=1, once=True)
 _SECOND = {"revolute": "rad", "prismatic": "m"}
+_EFFORT = {"revolute": "N m", "prismatic": "N"}
 
 
 def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
@@ -33,6 +34,13 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
         dims = dims if isinstance(dims, tuple) else (dims,)
         return dims, np.asarray(values), {"units": units, "long_name": meaning}
 
+    torque = {}
+    if motion.joint_torque is not None:
+        force = "/".join(sorted({_EFFORT[kind] for kind in robot.topology.joint_types}))
+        torque = {
+            "joint_torque": of(("time", "joint"), motion.joint_torque, force, "joint torque"),
+            "joint_torque_limit": of("joint", limits.torque, force, "torque limit"),
+        }
     return xarray.Dataset(
         {
             "joint_position": of(("time", "joint"), motion.joint_position, unit, "joint position"),
@@ -40,6 +48,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "joint_acceleration": of(
                 ("time", "joint"), motion.joint_acceleration, f"{unit}/s^2", "joint acceleration"
             ),
+            **torque,
             "base_position": of(
                 ("time", "axis"), motion.base_position, "m", "base centre of mass, inertial frame"
             ),

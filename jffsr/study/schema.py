@@ -11,7 +11,7 @@ from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
-from jffsr.study.schema_objective import TERMS, Objective
+from jffsr.study.schema_objective import EFFORTS, TERMS, Objective
 from jffsr.study.schema_solver import Optimizer, Output, Robust, Rollout, Trajectory, Verification
 from jffsr.study.schema_task import Limits, Task
 
@@ -62,6 +62,11 @@ class PlanningConfig(Section):
             return self.task.goal_attitude is None
         if name == "goal_attitude" and enabled is None:
             return self.task.goal_attitude is not None
+        if name == "joint_position" and enabled is None:
+            return not self.trajectory.keeps_position
+        if name == "joint_torque" and enabled is None:
+            efforts = (getattr(self.objective, effort).enabled for effort in EFFORTS)
+            return self.limits.torque is not None or any(efforts)
         if name == "attitude_excursion":
             return enabled and self.limits.base_excursion_si is not None
         return enabled
@@ -76,7 +81,7 @@ class PlanningConfig(Section):
         return self._sources.where(key)
 
     def per_joint(self, quantity: str, num_joints: int) -> tuple | None:
-        """The limit `position` ((low, high) each), `rate` or `acceleration` of each joint; rad or m, s.
+        """The limit `position` ((low, high) each), `rate`, `acceleration` or `torque` of each joint; rad or m, s, N.
 
         None when not given. Raises InputError when a list is given whose length is not the number of joints.
         """

@@ -19,11 +19,56 @@ Coefficient = Annotated[float, number(gt=0, lt=1.781)]
 Contraction = Annotated[tuple[Coefficient, ...], sequence("a pair of numbers in (0, 1.781)", 2, 2)]
 
 
-class Trajectory(Section):
-    """The joint law and the half width of the box of its free numbers."""
+SINE_POLYNOMIAL, POLYNOMIAL, BSPLINE = "sine_polynomial", "polynomial", "bspline"
+_OF_LAW = {  # the keys that each joint law knows, with their defaults
+    SINE_POLYNOMIAL: {"box": math.pi},
+    POLYNOMIAL: {"degree": 7, "box": 2.0},
+    BSPLINE: {"degree": 4, "control_points": 8, "box": 2.0},
+}
 
-    kind: Annotated[Literal["sine_polynomial"], choice("sine_polynomial")] = "sine_polynomial"
-    box: Positive = math.pi
+
+class Trajectory(Section):
+    """The joint law, its size, and the half width of the box of its free numbers; null is the law's own default."""
+
+    kind: Annotated[
+        Literal["sine_polynomial", "polynomial", "bspline"], choice(SINE_POLYNOMIAL, POLYNOMIAL, BSPLINE)
+    ] = SINE_POLYNOMIAL
+    degree: Annotated[int, whole(3, 20)] | None = None  # polynomial: 6 to 20; bspline: 3 to 20
+    control_points: Annotated[int, whole(7, 100)] | None = None  # bspline: those at the ends count
+    box: Positive | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default(cls, value):
+        # Written out, so that a resolved configuration shows what the law uses.
+        own = _OF_LAW.get(value.get("kind", SINE_POLYNOMIAL), {}) if _is_plain(value) else {}
+        missing = {key: default for key, default in own.items() if value.get(key) is None}
+        return {**value, **missing} if own else value
+
+    @model_validator(mode="after")
+    def _check(self) -> Trajectory:
+        for key in ("degree", "control_points"):
+            if getattr(self, key) is not None and key not in _OF_LAW[self.kind]:
+                sentence = (
+                    f"found {getattr(self, key)}, the law '{self.kind}' has no such number, leave it out"
+                )
+                raise conflict(sentence, key)
+        if self.kind == POLYNOMIAL and self.degree < 6:
+            sentence = f"found {self.degree}, a polynomial with free numbers has a degree of at least 6"
+            raise conflict(sentence, "degree")
+        if self.kind == BSPLINE and self.control_points <= self.degree:
+            sentence = f"found {self.control_points}, more than the degree ({self.degree}) are expected"
+            raise conflict(sentence, "control_points")
+        return self
+
+    @property
+    def keeps_position(self) -> bool:
+        """Whether finite position limits hold by the law's construction."""
+        return self.kind != POLYNOMIAL
+
+
+def _is_plain(value) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("kind", SINE_POLYNOMIAL), str)
 
 
 class Rollout(Section):

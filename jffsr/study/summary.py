@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jffsr.planning.plan import Plan
-from jffsr.planning.result import violations
+from jffsr.planning.result import LIMIT_KINDS, violations
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
@@ -55,8 +55,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
             },
             "limits_violated": list(violations(plan.problem, verification.overruns, tolerances)),
             "largest_overrun_relative": {
-                kind: float(np.max(getattr(verification.overruns, kind)))
-                for kind in ("position", "rate", "acceleration", "excursion")
+                kind: float(np.max(getattr(verification.overruns, kind))) for kind in LIMIT_KINDS
             },
         },
         "sensitivity": None if plan.sensitivity is None else sensitivity_summary(plan.sensitivity),
