@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
+from jffsr.objectives.constraints import Constraint
+from jffsr.optimizers.constraints import Evaluation
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.kernels import FAST
@@ -25,7 +28,7 @@ def _at_rest_at_origin() -> State:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Choose the free numbers of `trajectory` so that the index of the motion is least.
+    """Choose the free numbers of `trajectory` so that the index of the motion is least under the constraints.
 
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
     L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode
@@ -41,6 +44,7 @@ class Problem:
     num_steps: int = field(default=100, metadata={"static": True})
     base_mode: str = field(default=FLOATING, metadata={"static": True})
     kernel: str = field(default=FAST, metadata={"static": True})
+    constraints: tuple[Constraint, ...] = ()
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (k,) of the free numbers."""
@@ -69,6 +73,23 @@ class Problem:
         return (
             self.objective.smooth(self.robot, motion, looseness),
             self.objective.value(self.robot, motion),
+        )
+
+    def evaluation(self, candidate: Vector, looseness: Scalar | float = 1.0) -> Evaluation:
+        """The smooth index, the published one, and all constraints in their order, of the same motion."""
+        motion = self.motion(candidate)
+        equalities = [c.equality(self.robot, motion) for c in self.constraints]
+        allowed = [
+            jnp.broadcast_to(jnp.asarray(c.tolerance), found.shape)
+            for c, found in zip(self.constraints, equalities, strict=True)
+        ]
+        none = [jnp.zeros(0)]
+        return Evaluation(
+            smooth=self.objective.smooth(self.robot, motion, looseness),
+            value=self.objective.value(self.robot, motion),
+            equality=jnp.concatenate(none + equalities),
+            inequality=jnp.concatenate(none + [c.inequality(self.robot, motion) for c in self.constraints]),
+            tolerance=jnp.concatenate(none + allowed),
         )
 
     def terms(self, candidate: Vector) -> dict[str, TermValue]:

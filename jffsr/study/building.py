@@ -21,6 +21,7 @@ from jffsr.planning.result import Tolerances
 from jffsr.robots.loading import load_robot
 from jffsr.robots.robot import PRISMATIC, Robot
 from jffsr.robots.state import State
+from jffsr.study.building_constraints import build_constraints
 from jffsr.study.schema import PlanningConfig
 from jffsr.trajectories.sine_polynomial import SinePolynomial
 
@@ -41,6 +42,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         num_steps=config.rollout.num_steps,
         base_mode=config.rollout.base_mode,
         kernel=config.rollout.kernel,
+        constraints=build_constraints(config, robot),
     )
     _check_user_terms(config, problem)
     return problem
