@@ -73,7 +73,10 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run found. `reason` is converged, budget, target or interrupted."""
+    """What a run found. `reason` is converged, budget, target or interrupted.
+
+    violation is of the best point's constraints, where `jffsr.minimize` was given some.
+    """
 
     best_position: np.ndarray
     best_value: float
@@ -82,6 +85,7 @@ class Outcome:
     history: tuple[Record, ...]
     reason: str
     population: Population
+    violation: float = 0.0
 
     @property
     def interrupted(self) -> bool:

@@ -155,9 +155,18 @@ class GradientDescent:
 
     def step(self, problem: OptimizationProblem, state: GradientState) -> GradientState:
         """One trial of every active start."""
+        evaluated = self._evaluate(problem, state.descent.trial, state.descent.inside)
+        return self.advanced(problem, state, *evaluated)
+
+    def advanced(
+        self, problem: OptimizationProblem, state: GradientState, smooth: Array, value: Array, gradient: Array
+    ) -> GradientState:
+        """The state after the trials, given the smooth values (k,), true values (k,) and gradients (k, d) there.
+
+        Gradients are by the unconstrained coordinates; what is not finite is +inf, with a gradient of zero.
+        """
         descent, progress = state.descent, state.progress
         trial, inside = descent.trial, descent.inside
-        smooth, value, gradient = self._evaluate(problem, trial, inside)
         lower, upper = problem.bounds()
         advanced = jax.vmap(self._advance)(descent, trial, smooth, gradient)
         improved = descent.active & (value < descent.best_value)

@@ -14,7 +14,7 @@ import numpy as np
 
 from jffsr.compiling import jit
 from jffsr.errors import InputError
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.registry import Settings
 from jffsr.parallel.devices import all_devices
 from jffsr.parallel.mapping import spread
 from jffsr.planning.fingerprint import fingerprint
@@ -22,6 +22,7 @@ from jffsr.planning.plan import check_precision
 from jffsr.planning.plans_file import load_plans, save_plans
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances, result_code, settled
+from jffsr.planning.search import search_of, searchable
 from jffsr.planning.verification import Verification, verify
 from jffsr.robots.stacking import first_unlike
 from jffsr.rollouts.motion import Motion
@@ -81,7 +82,7 @@ def plan_many(
     check_precision("float64")
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *problems)
     settings, tolerances = settings or Settings(), tolerances or Tolerances()
-    phases = build_phases(optimizer, settings)
+    phases, _ = search_of(problems[0], optimizer, settings)
     lengths = tuple(int(phase.stop.iterations) for phase in phases)
     optimizers = [(phase.optimizer, phase.stop) for phase in phases]
     count = len(problems)
@@ -119,14 +120,15 @@ def _joined(parts: list[Plans]) -> Plans:
 def _plan_chunk(problems, optimizers, seed, numbers, lengths, step_factor, tolerances):
     def one(numbered: tuple[Problem, Array]) -> Plans:
         problem, number = numbered
+        searched = searchable(problem)
         key = jax.random.fold_in(jax.random.key(seed), number)
         population, evaluations, gradients, best = None, 0, 0, []
         for index, ((optimizer, stop), length) in enumerate(zip(optimizers, lengths, strict=True)):
-            state = optimizer.init(jax.random.fold_in(key, index), problem, population)
+            state = optimizer.init(jax.random.fold_in(key, index), searched, population)
 
             def step(state, _, optimizer=optimizer, stop=stop):
                 done = stop.reached(state.progress)
-                following = optimizer.step(problem, state)
+                following = optimizer.step(searched, state)
                 state = jax.tree.map(lambda old, new: jnp.where(done, old, new), state, following)
                 return state, state.progress.best_value
 
@@ -140,7 +142,9 @@ def _plan_chunk(problems, optimizers, seed, numbers, lengths, step_factor, toler
         ended = state.progress.converged | settled(jnp.concatenate(best))
         return Plans(
             result=result_code(problem, verification, ended, tolerances),
-            cost=state.progress.best_value,
+            cost=problem.objective.value(problem.robot, motion)
+            if problem.constraints
+            else state.progress.best_value,
             free=free,
             motion=motion,
             verification=verification,

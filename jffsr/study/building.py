@@ -30,6 +30,7 @@ from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.loading import load_robot
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.study.building_constraints import build_constraints
 from jffsr.study.joint_laws import build_trajectory
 from jffsr.study.schema import PlanningConfig
 
@@ -51,6 +52,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         base_mode=config.rollout.base_mode,
         kernel=config.rollout.kernel,
         uncertainty=_uncertainty(config, robot),
+        constraints=build_constraints(config, robot),
     )
     _check_user_terms(config, problem)
     return problem
