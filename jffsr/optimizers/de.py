@@ -60,7 +60,11 @@ class DE(PopulationOptimizer):
 
 
 def mutants(
-    key: Array, state: PopulationState, factor: Array | float, best_share: Array | float, kinds: tuple[str, ...]
+    key: Array,
+    state: PopulationState,
+    factor: Array | float,
+    best_share: Array | float,
+    kinds: tuple[str, ...],
 ) -> list[Array]:
     """Mutants (P, d) of each strategy asked for, from the same draws; factor is a number or (P, 1)."""
     x, best = state.kept, state.progress.best_position

@@ -24,7 +24,7 @@ from jffsr.types import Array
 
 # Those of evosax that were tried here on shifted functions; they compare values over generations (POPULATIONS), or
 # within one, where ranks say as much and have no scale.
-DISTRIBUTIONS = ("CMA_ES", "Sep_CMA_ES", "SNES", "xNES", "CR_FM_NES", "MA_ES")
+DISTRIBUTIONS = ("CMA_ES", "Sep_CMA_ES", "SNES", "CR_FM_NES", "MA_ES")
 POPULATIONS = ("PSO", "DifferentialEvolution")
 
 
@@ -85,8 +85,10 @@ class Evosax(PopulationOptimizer):
             # The first generation is the one that a strategy is begun with.
             told = jax.tree.map(lambda a, b: jnp.where(generation == 0, a, b), begun, told)
         else:
-            places = jnp.zeros(self.particles).at[jnp.argsort(state.kept_value)].set(
-                jnp.arange(self.particles, dtype=free.dtype)
+            places = (
+                jnp.zeros(self.particles)
+                .at[jnp.argsort(state.kept_value)]
+                .set(jnp.arange(self.particles, dtype=free.dtype))
             )
             told, _ = strategy.tell(tell, free, places, own, params)
         following = strategy.ask(ask, told, params)

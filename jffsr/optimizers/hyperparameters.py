@@ -102,7 +102,11 @@ def _shown(value: Any) -> str:
         return str(value).lower()
     if value is None:
         return "null"
-    return (f"'{value[:60]}'" if value.isprintable() else repr(value[:60])) if isinstance(value, str) else str(value)[:60]
+    return (
+        (f"'{value[:60]}'" if value.isprintable() else repr(value[:60]))
+        if isinstance(value, str)
+        else str(value)[:60]
+    )
 
 
 def _interval(low: float, high: float, inside: bool) -> str:

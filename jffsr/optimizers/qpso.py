@@ -22,6 +22,7 @@ from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, fraction_done
 from jffsr.optimizers.registry import LARGEST_CONTRACTION
 from jffsr.types import Array, Scalar
+
 RANK_WEIGHTS = (1.5, 0.5)
 """Weights of the best and the worst particle in the weighted mean; those between fall linearly, their mean is 1."""
 
@@ -69,7 +70,9 @@ class QPSO(PopulationOptimizer):
         phi = jax.random.uniform(mix, state.position.shape)
         attractor = phi * state.kept + (1 - phi) * state.progress.best_position
         # A random sign times log(1/u), u uniform in (0, 1], is a Laplace variable: one draw instead of two.
-        jump = jnp.abs(self._mean_best(state) - state.position) * jax.random.laplace(leap, state.position.shape)
+        jump = jnp.abs(self._mean_best(state) - state.position) * jax.random.laplace(
+            leap, state.position.shape
+        )
         lower, upper = problem.bounds()
         return jnp.clip(attractor + contraction * jump, lower, upper), state.own
 

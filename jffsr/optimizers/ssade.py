@@ -59,7 +59,9 @@ class SSADE(PopulationOptimizer):
         lower, upper, width = box_width(problem)
         distance = mean_distance(state.kept, state.progress.best_position, width)
         largest = jnp.maximum(state.own, distance)
-        stage = self.stage_number(jnp.where(largest > 0, distance / jnp.where(largest > 0, largest, 1.0), 0.0))
+        stage = self.stage_number(
+            jnp.where(largest > 0, distance / jnp.where(largest > 0, largest, 1.0), 0.0)
+        )
         mutation, numbers, rates, again, cross = jax.random.split(key, 5)
         factor = self.draw_factor(uniforms(numbers, (self.particles, 1)))
         rate = self.crossover_mean + self.crossover_std * jax.random.normal(rates, (self.particles, 1))
