@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import optax
 
 from jffsr.optimizers.box import from_box, to_box
+from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import (
     OptimizationProblem,
     Population,
@@ -86,8 +87,8 @@ class GradientDescent:
     objective is. starts, method and memory are static.
     """
 
-    gradient_tolerance: Array | float = 1e-8
-    value_tolerance: Array | float = 1e-9
+    gradient_tolerance: Array | float = number(1e-8, 0)
+    value_tolerance: Array | float = number(1e-9, 0)
     learning_rate: Array | float = 0.05
     looseness: Array | float = 1.0
     starts: int = field(default=4, metadata={"static": True})

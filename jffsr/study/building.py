@@ -83,21 +83,7 @@ def build_robot(config: PlanningConfig) -> Robot:
 
 def build_settings(config: PlanningConfig) -> tuple[str, Settings]:
     """The registered optimizer's name and its settings."""
-    chosen = config.optimizer
-    return chosen.kind, Settings(
-        particles=chosen.particles,
-        evaluations=chosen.evaluations,
-        swarm_evaluations=chosen.swarm_evaluations,
-        contraction=chosen.contraction,
-        starts=chosen.starts,
-        gradient_iterations=chosen.gradient_iterations,
-        polish_iterations=chosen.polish_iterations,
-        looseness=chosen.looseness,
-        method=chosen.method,
-        learning_rate=chosen.learning_rate,
-        memory=chosen.memory,
-        target=chosen.target,
-    )
+    return config.optimizer.kind, config.optimizer.settings()
 
 
 def build_tolerances(config: PlanningConfig) -> Tolerances:
