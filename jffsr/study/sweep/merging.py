@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.parts import Part
 from jffsr.study.sweep.points import Point, value_text
-from jffsr.writing import write_atomically
 
 MISSING = -1
 """The code of a point that could not be computed."""
@@ -128,4 +128,4 @@ def _effective(point: Point, key: str) -> Any:
 def save_sweep(dataset: Any, path: Path) -> None:
     """Write a sweep as netCDF-4 atomically, its texts as fixed-width characters, which every reader knows."""
     texts = {name: {"dtype": "S1"} for name, values in dataset.variables.items() if values.dtype.kind == "U"}
-    write_atomically(path, lambda part: dataset.to_netcdf(part, engine="h5netcdf", encoding=texts))
+    save_dataset(dataset, path, texts)

@@ -70,7 +70,7 @@ def load_parts(folder: Path, tasks: Sequence[Task]) -> list[Part]:
 
 
 def _read(path: Path) -> tuple[Part, list[str]]:
-    with np.load(path, allow_pickle=False) as file:
+    with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
         head = json.loads(file["head"].tobytes())
         results = {name: file[name] for name in file.files if name != "head"}
     if head["format"] != _FORMAT:
