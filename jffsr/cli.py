@@ -110,10 +110,10 @@ def _parser() -> argparse.ArgumentParser:
 
     show = commands.add_parser(
         "show",
-        help="print a finished run and draw its figures",
-        description="Print a finished run and draw it, as .png and, for a paper, as .pdf.",
+        help="print a finished run or sweep and draw its figures",
+        description="Print a finished run or sweep and draw it, as .png and, for a paper, as .pdf.",
     )
-    show.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
+    show.add_argument("run", metavar="RUN_DIR", help="the folder of a finished run or sweep")
     show.set_defaults(command=_show)
 
     robots = commands.add_parser(
@@ -190,6 +190,10 @@ def _sweep(arguments: argparse.Namespace) -> int:
         return INTERRUPTED
     if sweep.already_finished:
         print(f"{path} is finished:")
+    elif sweep.figures:
+        from jffsr.viz.sweep import draw_sweep
+
+        draw_sweep(path, ["png"])
     print(f"\n{sweep.table}\n{spec.name}: {sweep.summary['result']['sentence']}\n  folder  {path}")
     if sweep.failures:
         print(f"jffsr: {sweep.failures[0]}; the same command tries again", file=sys.stderr)
@@ -269,11 +273,19 @@ def _show(arguments: argparse.Namespace) -> int:
     _prepare_jax()
     from jffsr.study.run_folder import RunFolder
     from jffsr.study.summary import summary_text
-    from jffsr.viz.run import draw_run
 
-    files = draw_run(arguments.run)
     summary = RunFolder(Path(arguments.run)).read_summary()
-    print(summary_text(summary))
+    if summary.get("kind") == "sweep":
+        from jffsr.viz.sweep import draw_sweep
+
+        files = draw_sweep(arguments.run)
+        print((Path(arguments.run) / "table.md").read_text(encoding="utf-8"))
+        print(f"{summary['name']}: {summary['result']['sentence']}")
+    else:
+        from jffsr.viz.run import draw_run
+
+        files = draw_run(arguments.run)
+        print(summary_text(summary))
     print("  figures       " + "\n                ".join(str(file) for file in files))
     return MET
 

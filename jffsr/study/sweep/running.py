@@ -27,12 +27,13 @@ from jffsr.study.sweep.tasks import Task, sort_into_tasks
 
 @dataclass(frozen=True)
 class Sweep:
-    """How a sweep ended: its folder, its summary, its table, and what failed, each with its reason."""
+    """How a sweep ended: its folder, its summary, its table, what failed, each with its reason, and whether to draw."""
 
     folder: SweepFolder
     summary: dict[str, Any] | None
     table: str = ""
     failures: tuple[str, ...] = ()
+    figures: bool = False
     interrupted: bool = False
     already_finished: bool = False
 
@@ -109,7 +110,7 @@ def _run(
         summary, table = _finish(folder, spec, points, parts, failures)
     except OSError as error:
         raise _no_room(folder, error, len(done), len(points)) from None
-    return Sweep(folder, summary, table, tuple(failures))
+    return Sweep(folder, summary, table, tuple(failures), figures=points[0].config.output.figures)
 
 
 def _outcomes(
