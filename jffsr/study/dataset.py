@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -104,9 +105,16 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
     )
 
 
-def save_dataset(dataset, path: Path) -> None:
-    """Write a Dataset as netCDF-4 atomically."""
-    write_atomically(path, lambda part: dataset.to_netcdf(part, engine="h5netcdf"))
+def save_dataset(dataset, path: Path, encoding: dict | None = None) -> None:
+    """Write a Dataset as netCDF-4 atomically; encoding is xarray's. Raises OSError where there is no room for it."""
+    # HDF5 may end the process where the disk is full, so it writes to memory first.
+    buffer = io.BytesIO()
+    dataset.to_netcdf(buffer, engine="h5netcdf", encoding=encoding or {})
+
+    def write(part: Path) -> None:
+        part.write_bytes(buffer.getbuffer())
+
+    write_atomically(path, write)
 
 
 def open_dataset(path: Path):
