@@ -56,8 +56,8 @@ class Problem:
 
     def motion(self, candidate: Vector, robot: Robot | None = None) -> Motion:
         """The motion under the free numbers (k,), of another robot where one is given."""
-        trajectory = self.trajectory.with_free(candidate)
         robot = self.robot if robot is None else robot
+        trajectory = self.trajectory.with_free(candidate)
         motion = rollout(
             robot,
             trajectory,

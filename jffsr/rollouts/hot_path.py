@@ -75,7 +75,7 @@ def hot_joint_terms(robot: Robot, joint_position: Array, joint_velocity: Array) 
     return jax.lax.optimization_barrier(terms)
 
 
-class _Carried(NamedTuple):
+class Carried(NamedTuple):
     """What a joint carries, about a point and in a frame that the step names; leaves (G,), mass ().
 
     mass; first, its first moment; inertia about the point; linear and angular, the momentum of the motion
@@ -119,12 +119,12 @@ def joint_constants(robot: Robot) -> JointConstants:
     )
 
 
-def _inwards(robot: Robot, q: Array, qd: Array) -> _Carried:
+def _inwards(robot: Robot, q: Array, qd: Array) -> Carried:
     """What the base carries, about its centre of mass and in its frame, at joint positions and rates (n, G)."""
     topology, constants = robot.topology, joint_constants(robot)
     zero = jnp.zeros_like(q[0])
-    nothing = _Carried(jnp.zeros_like(constants.mass[0]), (zero,) * 3, (zero,) * 6, (zero,) * 3, (zero,) * 3)
-    on_body: dict[int, list[_Carried]] = {}
+    nothing = Carried(jnp.zeros_like(constants.mass[0]), (zero,) * 3, (zero,) * 6, (zero,) * 3, (zero,) * 3)
+    on_body: dict[int, list[Carried]] = {}
     for root, joints in reversed(unbranched_parts(topology)):
         turning = topology.is_revolute[list(joints)]
         index = np.array(joints[::-1])
@@ -132,10 +132,10 @@ def _inwards(robot: Robot, q: Array, qd: Array) -> _Carried:
         if turning.any() and not turning.all():
             inputs = (*inputs, turning[::-1].copy())
         kind = turning[0] if len(inputs) == 3 else None
-        start = _sum(on_body.pop(joints[-1] + 1, [nothing]))
+        start = summed(on_body.pop(joints[-1] + 1, [nothing]))
         carried, _ = jax.lax.scan(lambda c, x, kind=kind: (_step(c, *x, kind=kind), None), start, inputs)
         on_body.setdefault(root, []).append(carried)
-    return _sum(on_body[0])
+    return summed(on_body[0])
 
 
 def unbranched_parts(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
@@ -157,19 +157,27 @@ def unbranched_parts(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
     return found
 
 
-def _sum(parts: list[_Carried]) -> _Carried:
+def summed(parts: list[Carried]) -> Carried:
     return jax.tree.map(lambda *x: sum(x[1:], start=x[0]), *parts)
 
 
-def _step(carried: _Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> _Carried:
-    """Take up one body and pass its joint: from about the outer joints to about the parent's frame.
+def _step(carried: Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> Carried:
+    """Take up one body and pass its joint: from about the outer joints to about the parent's frame."""
+    return passed(taken_up(carried, body), body, q, qd, turns, kind=kind)
+
+
+def taken_up(carried: Carried, body: JointConstants) -> Carried:
+    """With a body's own mass, first moment and inertia, in its frame and about its joint."""
+    first = add(carried.first, tuple(body.first))
+    inertia = tuple(a + b for a, b in zip(carried.inertia, tuple(body.inertia), strict=True))
+    return Carried(carried.mass + body.mass, first, inertia, carried.linear, carried.angular)
+
+
+def passed(state: Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> Carried:
+    """The same from a body's frame to its parent's, by a joint of this position and rate.
 
     kind says whether the joint turns (else it slides); None leaves it to `turns`, a traced flag.
     """
-    mass = carried.mass + body.mass
-    first = add(carried.first, tuple(body.first))
-    inertia = tuple(a + b for a, b in zip(carried.inertia, tuple(body.inertia), strict=True))
-    state = _Carried(mass, first, inertia, carried.linear, carried.angular)
     if kind is None:
         # A joint of the other kind is passed at zero and at rest.
         state = _slid(state, jnp.where(turns, 0.0, q), jnp.where(turns, 0.0, qd))
@@ -179,7 +187,7 @@ def _step(carried: _Carried, body: JointConstants, q: Array, qd: Array, turns=No
     return jax.lax.optimization_barrier(_placed(state, body.rotation, tuple(body.offset)))
 
 
-def _turned(c: _Carried, q: Array, qd: Array) -> _Carried:
+def _turned(c: Carried, q: Array, qd: Array) -> Carried:
     """After a turn about z: the rate's momentum added, all components turned."""
     x, y, z = c.first
     xx, yy, zz, xy, xz, yz = c.inertia
@@ -197,10 +205,10 @@ def _turned(c: _Carried, q: Array, qd: Array) -> _Carried:
     double_cosine, double_sine = cosine * cosine - sine * sine, 2 * sine * cosine
     spread = double_cosine * half - double_sine * xy
     inertia = (mean + spread, mean - spread, zz, double_sine * half + double_cosine * xy, *turn(xz, yz))
-    return _Carried(c.mass, (*turn(x, y), z), inertia, (*turn(px, py), pz), (*turn(lx, ly), lz))
+    return Carried(c.mass, (*turn(x, y), z), inertia, (*turn(px, py), pz), (*turn(lx, ly), lz))
 
 
-def _slid(c: _Carried, q: Array, qd: Array) -> _Carried:
+def _slid(c: Carried, q: Array, qd: Array) -> Carried:
     """After a slide along z."""
     x, y, z = c.first
     xx, yy, zz, xy, xz, yz = c.inertia
@@ -211,10 +219,10 @@ def _slid(c: _Carried, q: Array, qd: Array) -> _Carried:
     # And now about the point that the joint started from.
     shift = q * (2 * z + c.mass * q)
     inertia = (xx + shift, yy + shift, zz, xy, xz - q * x, yz - q * y)
-    return _Carried(c.mass, (x, y, z + c.mass * q), inertia, (px, py, pz), (lx - q * py, ly + q * px, lz))
+    return Carried(c.mass, (x, y, z + c.mass * q), inertia, (px, py, pz), (lx - q * py, ly + q * px, lz))
 
 
-def _placed(c: _Carried, rotation: Array, offset: Components) -> _Carried:
+def _placed(c: Carried, rotation: Array, offset: Components) -> Carried:
     """In the parent's frame and about its origin."""
     rows: Rows = tuple(tuple(rotation[r, k] for k in range(3)) for r in range(3))
     first, linear = rows_times(rows, c.first), rows_times(rows, c.linear)
@@ -229,4 +237,4 @@ def _placed(c: _Carried, rotation: Array, offset: Components) -> _Carried:
     own = symmetric_turned(rows, c.inertia)
     constant = point_inertia(offset)
     inertia = tuple(o + m + c.mass * k for o, m, k in zip(own, mixed, constant, strict=True))
-    return _Carried(c.mass, add(first, scale(c.mass, offset)), inertia, linear, angular)
+    return Carried(c.mass, add(first, scale(c.mass, offset)), inertia, linear, angular)
