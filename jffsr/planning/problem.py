@@ -10,7 +10,7 @@ import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
-from jffsr.objectives.constraints import Constraint
+from jffsr.objectives.constraints import Constraint, tolerance_of
 from jffsr.optimizers.constraints import Evaluation
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -19,6 +19,9 @@ from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
 from jffsr.trajectories.interface import PlannedTrajectory
 from jffsr.types import Array, Scalar, Vector
+
+SEARCH_SHARE = 0.1
+"""What the search may use of an equality's tolerance; the rest is for the difference of the finer grid."""
 
 
 def _at_rest_at_origin() -> State:
@@ -80,7 +83,7 @@ class Problem:
         motion = self.motion(candidate)
         equalities = [c.equality(self.robot, motion) for c in self.constraints]
         allowed = [
-            jnp.broadcast_to(jnp.asarray(c.tolerance), found.shape)
+            jnp.broadcast_to(SEARCH_SHARE * jnp.asarray(tolerance_of(c)), found.shape)
             for c, found in zip(self.constraints, equalities, strict=True)
         ]
         none = [jnp.zeros(0)]

@@ -23,7 +23,7 @@ def message(text, *overrides):
 RATE = "a number > 0 or a list with one per joint is expected"
 SEED = "a whole number in [0, 4294967295] is expected"
 TOP = (
-    "kind, name, robot, limits, task, trajectory, objective, rollout, optimizer, verification, "
+    "kind, name, robot, limits, task, trajectory, objective, constraints, rollout, optimizer, verification, "
     "output, seed, precision"
 )
 
