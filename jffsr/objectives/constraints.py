@@ -2,7 +2,7 @@
 
 A constraint has a `name`, `equality(robot, motion)` (e,), zero when kept, and `inequality(robot, motion)` (i,), at
 most zero when kept, both scaled so that 1 is a gross miss and differentiable everywhere; either may be empty. Its
-`tolerance` is how far the motion may be off on the finer grid of the verification, and an equality in the search.
+`tolerance`, 1e-8 where it has none, is how far the motion may be off on the finer grid of the verification.
 """
 
 from __future__ import annotations
@@ -31,11 +31,18 @@ class Constraint(Protocol):
     """What a problem needs of a constraint."""
 
     name: str
-    tolerance: Array | float
 
     def equality(self, robot: Robot, motion: Motion) -> Array: ...
 
     def inequality(self, robot: Robot, motion: Motion) -> Array: ...
+
+
+DEFAULT_TOLERANCE = 1e-8
+
+
+def tolerance_of(constraint: Constraint) -> Array | float:
+    """The constraint's own tolerance, else the default."""
+    return getattr(constraint, "tolerance", DEFAULT_TOLERANCE)
 
 
 def largest_violation(constraint: Constraint, robot: Robot, motion: Motion) -> Scalar:

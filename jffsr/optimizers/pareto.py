@@ -29,15 +29,15 @@ _WORST = 1e30
 class MultiObjectiveProblem(Protocol):
     """A box and several objectives, written for one candidate (d,).
 
-    `values` (m,) are what is minimised and reported; `smooth_values` (m,) are differentiable stand-ins, which a
-    looseness above 1 makes rounder.
+    `values` (m,) are what is minimised and reported; `smooth_and_values` gives differentiable stand-ins (m,) together
+    with them; a looseness above 1 makes the stand-ins rounder.
     """
 
     def bounds(self) -> tuple[Vector, Vector]: ...
 
     def values(self, candidate: Vector) -> Vector: ...
 
-    def smooth_values(self, candidate: Vector, looseness: Scalar) -> Vector: ...
+    def smooth_and_values(self, candidate: Vector, looseness: Scalar) -> tuple[Vector, Vector]: ...
 
 
 @jax.tree_util.register_dataclass
@@ -57,9 +57,10 @@ class FunctionObjectives:
         """The function's numbers."""
         return jnp.stack([jnp.asarray(value) for value in self.function(candidate)])
 
-    def smooth_values(self, candidate: Vector, looseness: Scalar | float = 1.0) -> Vector:
-        """The same: they are their own stand-ins."""
-        return self.values(candidate)
+    def smooth_and_values(self, candidate: Vector, looseness: Scalar | float = 1.0) -> tuple[Vector, Vector]:
+        """The numbers twice: they are their own stand-ins."""
+        values = self.values(candidate)
+        return values, values
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ def pareto(
     evaluations: int = 20_000,
     *,
     population: int = 100,
-    polish_iterations: int = 60,
+    polish_iterations: int = 150,
     reference: Sequence[float] | None = None,
     seed: int = 0,
 ) -> ParetoSet:
@@ -114,7 +115,7 @@ def pareto_set(
     evaluations: int = 20_000,
     *,
     population: int = 100,
-    polish_iterations: int = 60,
+    polish_iterations: int = 150,
     reference: Sequence[float] | None = None,
     seed: int = 0,
 ) -> ParetoSet:

@@ -30,18 +30,20 @@ if TYPE_CHECKING:
 
 _SUM = 0.01
 _BEYOND = 0.1
-_WIDTH = 1e-3
-_LOOSENESS = (10.0, 1.0)
+# Looseness of the objectives and width of the rounded maximum, one after the other.
+_STAGES = ((10.0, 1e-2), (1.0, 1e-3), (1.0, 1e-5))
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Member:
-    """The scalarisation of one member: its values (m,), the corner z (m,), and the problem."""
+    """The scalarisation of one member: its values (m,), the corner z (m,), the width of the rounded maximum, and
+    the problem."""
 
     problem: MultiObjectiveProblem
     values: Vector
     corner: Vector
+    width: Scalar | float
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Those of the problem."""
@@ -60,9 +62,9 @@ class Member:
 
     def smooth_and_value(self, candidate: Vector, looseness: Scalar | float = 1.0) -> tuple[Scalar, Scalar]:
         """The rounded scalarisation of the smooth objectives, and the exact one of the true ones."""
-        ratio = self._ratio(self.problem.smooth_values(candidate, looseness))
-        smooth = smooth_max(ratio, _WIDTH * looseness) + _SUM * jnp.sum(ratio)
-        return smooth, self._value(self.problem.values(candidate))
+        smooth, found = self.problem.smooth_and_values(candidate, looseness)
+        ratio = self._ratio(smooth)
+        return smooth_max(ratio, self.width) + _SUM * jnp.sum(ratio), self._value(found)
 
 
 @program(static_argnums=4)
@@ -76,26 +78,29 @@ def polished(
 
     def one(item: tuple[Vector, Vector, Array]):
         position, value, own_key = item
-        member = Member(problem, value, corner)
-        at_start = 1.0 + _SUM * value.shape[0]
-        population, used = Population(position[None], jnp.array([at_start])), 0
-        for looseness in _LOOSENESS:
-            descent = GradientDescent(looseness=looseness, starts=1)
-            state = descent.init(own_key, member, population)
+        at_start = jnp.asarray(1.0 + _SUM * value.shape[0])
 
-            def step(state, _, descent=descent):
+        def stage(best, setting):
+            member = Member(problem, value, corner, setting[1])
+            descent = GradientDescent(looseness=setting[0], starts=1)
+            population = Population(best[0][None], best[1][None])
+
+            def step(state, _):
                 following = descent.step(member, state)
                 held = state.progress.converged
                 return jax.tree.map(lambda old, new: jnp.where(held, old, new), state, following), None
 
-            state, _ = jax.lax.scan(step, state, length=-(-iterations // len(_LOOSENESS)))
-            population = descent.population(state)
-            used += state.progress.gradient_evaluations
-        found = population.positions[0]
+            state = descent.init(own_key, member, population)
+            state, _ = jax.lax.scan(step, state, length=-(-iterations // len(_STAGES)))
+            found = descent.population(state)
+            return (found.positions[0], found.values[0]), state.progress.gradient_evaluations
+
+        # One loop, so that the gradient is compiled once for all stages.
+        (found, _), used = jax.lax.scan(stage, (position, at_start), jnp.array(_STAGES))
         # Evaluated again, and kept only where it still is no worse: the last bit may differ between programs.
         there = problem.values(found)
         better = jnp.all(there <= value) & jnp.any(there < value)
-        return jnp.where(better, found, position), jnp.where(better, there, value), used
+        return jnp.where(better, found, position), jnp.where(better, there, value), jnp.sum(used)
 
     keys = jax.random.split(key, positions.shape[0])
     return spread(one, (positions, values, keys), together=True)

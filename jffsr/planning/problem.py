@@ -10,7 +10,7 @@ import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
-from jffsr.objectives.constraints import Constraint
+from jffsr.objectives.constraints import Constraint, tolerance_of
 from jffsr.optimizers.constraints import Evaluation
 from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.robot import Robot
@@ -21,6 +21,9 @@ from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
 from jffsr.trajectories.interface import PlannedTrajectory
 from jffsr.types import Array, Scalar, Vector
+
+SEARCH_SHARE = 0.1
+"""What the search may use of an equality's tolerance; the rest is for the difference of the finer grid."""
 
 
 def _at_rest_at_origin() -> State:
@@ -106,7 +109,7 @@ class Problem:
             smooth, value = self.smooth_and_value(candidate, looseness)
         equalities = [c.equality(self.robot, motion) for c in self.constraints]
         allowed = [
-            jnp.broadcast_to(jnp.asarray(c.tolerance), found.shape)
+            jnp.broadcast_to(SEARCH_SHARE * jnp.asarray(tolerance_of(c)), found.shape)
             for c, found in zip(self.constraints, equalities, strict=True)
         ]
         none = [jnp.zeros(0)]

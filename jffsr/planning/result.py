@@ -9,6 +9,7 @@ from enum import IntEnum
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
 from jffsr.types import Array
@@ -68,7 +69,7 @@ def result_code(
     code = jnp.where(met, ResultCode.ACCURACY_MET, short)
     code = jnp.where(met & (largest > tolerances.limit), ResultCode.LIMITS_VIOLATED, code)
     for constraint in problem.constraints:
-        kept = verification.violations[constraint.name] <= constraint.tolerance
+        kept = verification.violations[constraint.name] <= tolerance_of(constraint)
         code = jnp.where(kept, code, ResultCode.CONSTRAINTS_VIOLATED)
     code = jnp.where(verified, code, ResultCode.NOT_VERIFIED)
     return jnp.where(finite, code, ResultCode.NOT_FINITE).astype(jnp.int32)
@@ -150,7 +151,7 @@ def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[
 def constraints_missed(problem: Problem, verification: Verification) -> Iterator[str]:
     """Each constraint that the finer run misses by more than its tolerance, and by how much."""
     for constraint in problem.constraints:
-        missed, allowed = float(verification.violations[constraint.name]), float(constraint.tolerance)
+        missed, allowed = float(verification.violations[constraint.name]), float(tolerance_of(constraint))
         if not missed <= allowed:
             yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g})"
 

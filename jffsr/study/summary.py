@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import LIMIT_KINDS, violations
 from jffsr.study.robust_summary import robust_lines
@@ -56,7 +57,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
             "constraints": {
                 constraint.name: {
                     "violation": float(verification.violations[constraint.name]),
-                    "tolerance": float(constraint.tolerance),
+                    "tolerance": float(tolerance_of(constraint)),
                 }
                 for constraint in plan.problem.constraints
             },
