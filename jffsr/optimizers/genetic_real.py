@@ -33,7 +33,7 @@ class RealGA(PopulationOptimizer):
     crossover: sbx, with children as near their parents as crossover_index is large; or blend, with children uniform
     in the parents' interval lengthened by blend_margin of its length at both ends. A child has `mutations` numbers
     changed on average, by a share of the box that is small where mutation_index is large. With elitism the best
-    parent takes the place of the worst child where it is better. particles, selection, contestants, crossover and elitism are static.
+    parent takes the place of the worst child where it is better. Sizes, names and elitism are static.
     """
 
     crossover_rate: Array | float = number(0.9, 0, 1)
