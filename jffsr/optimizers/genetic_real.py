@@ -28,12 +28,12 @@ SBX, BLEND = "sbx", "blend"
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class RealGA(PopulationOptimizer):
-    """Parents are selected and mated in pairs with probability crossover_rate; children stay within the box by clipping.
+    """Parents are selected and mated in pairs with probability crossover_rate; children are clipped to the box.
 
-    crossover: sbx, with children as near their parents as crossover_index is large; or blend, with children uniform in
-    the parents' interval lengthened by blend_margin of its length at both ends. A child has `mutations` numbers changed on
-    average, by a share of the box that is small where mutation_index is large. With elitism the best parent takes the
-    place of the worst child where it is better. particles, selection, contestants, crossover and elitism are static.
+    crossover: sbx, with children as near their parents as crossover_index is large; or blend, with children uniform
+    in the parents' interval lengthened by blend_margin of its length at both ends. A child has `mutations` numbers
+    changed on average, by a share of the box that is small where mutation_index is large. With elitism the best
+    parent takes the place of the worst child where it is better. Sizes, names and elitism are static.
     """
 
     crossover_rate: Array | float = number(0.9, 0, 1)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import jax
 import jax.numpy as jnp
 
-from jffsr.optimizers.hyperparameters import choice, number
+from jffsr.optimizers.hyperparameters import choice, flag, number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width, fraction_done
 from jffsr.optimizers.randoms import uniforms
@@ -30,7 +30,8 @@ class PSO(PopulationOptimizer):
     rule: `constant` uses inertia, cognitive and social; `constriction` computes all three from phi > 4; `linear` lets
     the inertia fall from inertia_start to inertia_end over `iterations`; `success` sets it between these two by the
     share of particles that bettered their best last time. A velocity is at most velocity_limit box widths; a particle
-    that would leave the box stops at its bound with no velocity across it. particles and rule are static.
+    that would leave the box stops at its bound with no velocity across it. With shared_draws a particle draws one
+    random weight for each pull, not one for each number. particles, rule and shared_draws are static.
     """
 
     iterations: Array | float
@@ -43,6 +44,7 @@ class PSO(PopulationOptimizer):
     velocity_limit: Array | float = number(0.5, 0, 1e3, inside=True)
     particles: int = field(default=50, metadata={"static": True})
     rule: str = choice("constant", "constant", "constriction", "linear", "success")
+    shared_draws: bool = flag(False)
 
     def begin(self, problem: OptimizationProblem, key: Array, position: Array) -> tuple[Array, Array]:
         """Velocities (P, d) half of the way to a random place, and the share of successes."""
@@ -71,7 +73,8 @@ class PSO(PopulationOptimizer):
         """Each particle one velocity further."""
         velocity, success = state.own
         inertia, cognitive, social = self.coefficients(generation, success)
-        own, common = uniforms(key, (2, *state.position.shape))
+        count, dimensions = state.position.shape
+        own, common = uniforms(key, (2, count, 1 if self.shared_draws else dimensions))
         lower, upper, width = box_width(problem)
         velocity = (
             inertia * velocity

@@ -34,15 +34,16 @@ def shares(values: Array, scheme: str) -> Array:
         places = jnp.zeros(count, dtype=int).at[jnp.argsort(values)].set(jnp.arange(count))
         return (count - places).astype(float)
     finite = jnp.isfinite(values)
-    # Halves, because a difference of finite numbers may not be one.
-    half = jnp.where(finite, values / 2, 0.0)
-    best = jnp.min(jnp.where(finite, half, jnp.inf))
-    worst = jnp.max(jnp.where(finite, half, -jnp.inf))
+    # An eighth, so that neither a difference of finite numbers nor its reciprocal leaves the range of numbers.
+    part = jnp.where(finite, values / 8, 0.0)
+    best = jnp.min(jnp.where(finite, part, jnp.inf))
+    worst = jnp.max(jnp.where(finite, part, -jnp.inf))
     spread = worst - best
-    fits = jnp.where(finite, worst - half, 0.0) / jnp.where(spread > 0, spread, 1.0)
+    apart = spread > 16 * jnp.finfo(part.dtype).tiny
+    fits = jnp.where(finite, worst - part, 0.0) / jnp.where(apart, spread, 1.0)
     # With nothing to choose between them, all candidates count the same: the finite ones, or all.
     same = jnp.where(jnp.any(finite), finite, True).astype(float)
-    return jnp.where(spread > 0, fits, same)
+    return jnp.where(apart, fits, same)
 
 
 def spin(uniform: Array, share: Array) -> Array:

@@ -16,11 +16,12 @@ from jffsr.errors import InputError
 from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.ahead import prepare_run
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
+from jffsr.optimizers.history import before_last_tenth
 from jffsr.optimizers.registry import Settings
 from jffsr.planning.codesign import CoDesign
 from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
+from jffsr.planning.result import Result, Tolerances, explain, result_code, stands_still
 from jffsr.planning.search import search_of
 from jffsr.planning.sensitivity import Sensitivity, prepare_sensitivity, sensitivity
 from jffsr.planning.stopwatch import Stopwatch
@@ -35,8 +36,9 @@ class Plan:
 
     cost and terms are the published index of the motion at the planner's own step; verification has them
     again at the finer one, by which `result` judges. free holds the chosen free numbers (k,). evaluations and
-    gradient_evaluations are counted apart; history has one record an iteration, its values merits where there are
-    constraints (`jffsr.optimizers.constraints.split`); seconds: compile, run, total.
+    gradient_evaluations are counted apart; history has one record an iteration, or of a long search those that bettered
+    the index, its values merits where there are constraints (`jffsr.optimizers.constraints.split`); seconds: compile,
+    run, total.
     sensitivity holds the derivatives by the robot's masses and inertias, None where they were not asked for.
     """
 
@@ -188,8 +190,10 @@ def _prepare_review(problem: Problem, step_factor: int, with_sensitivity: bool) 
 
 def _at_its_end(outcome: Outcome) -> bool:
     """Whether the search had stopped improving, by its own word or by its last steps."""
-    values = np.array([record.best_value for record in outcome.history])
-    return outcome.reason in ("converged", "target") or bool(settled(values))
+    if outcome.reason in ("converged", "target"):
+        return True
+    earlier = before_last_tenth(outcome.history)
+    return earlier is not None and bool(stands_still(earlier, outcome.history[-1].best_value))
 
 
 def check_precision(precision: str) -> None:

@@ -83,7 +83,11 @@ def settled(best_values: Array) -> Array:
     steps = best_values.shape[0]
     if steps < 2:
         return np.array(False)
-    earlier, last = best_values[-1 - max(1, steps // 10)], best_values[-1]
+    return stands_still(best_values[-1 - max(1, steps // 10)], best_values[-1])
+
+
+def stands_still(earlier: Array | float, last: Array | float) -> Array | bool:
+    """Whether the later of two best values is better by no more than 1 %."""
     return (abs(earlier) < np.inf) & (earlier <= last + 0.01 * abs(earlier))
 
 

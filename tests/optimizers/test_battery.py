@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from shifted_functions import LOWER, OPTIMUM, UPPER, Poisoned, sphere
 
-from jffsr.compiling import ONCE
+from jffsr.compiling import ONCE, Program
+from jffsr.optimizers import driver
 from jffsr.optimizers.driver import Stop, run
 from jffsr.optimizers.interface import Population
 from jffsr.optimizers.qpso import QPSO
@@ -75,6 +76,15 @@ def trial(percent=0, wall=1e3, infinite=1e3) -> Trial:
 
 def phases(kind: str, **changes):
     return build_phases(kind, replace(SETTINGS, options=OPTIONS.get(kind, {}), **changes))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_fast():
+    """Half of the tests' time would go to optimising programs that run for milliseconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driver, "_advance_jit", Program(driver._advance, static_argnums=4, once=True))
+        patch.setattr(driver, "_init", Program(driver._init._function, once=True))
+        yield
 
 
 @cache
