@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -54,6 +54,9 @@ bench:  ## time rollouts against everything else that computes them (QUICK=1: so
 	    -e '.[bench]' -c constraints.txt \
 	    || echo "Not all opponents could be installed; the table says which are missing." >&2
 	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks $(if $(QUICK),--quick --out runs/benchmarks/rollouts.md)
+
+compare: $(STAMP)  ## compare every optimizer on robots (goes on where it was stopped)
+	$(VENV_PYTHON) -m experiments.comparison
 
 check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
 	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)

@@ -17,6 +17,7 @@ from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.ahead import prepare_run
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
 from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.planning.codesign import CoDesign
 from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
@@ -88,7 +89,7 @@ _judged = Program(result_code, static_argnums=3, once=True)
 
 
 def solve(
-    problem: Problem,
+    problem: Problem | CoDesign,
     optimizer: str = "hybrid",
     settings: Settings | None = None,
     *,
@@ -106,8 +107,9 @@ def solve(
 
     The arguments are those of the driver, and step_factor and tolerances of the verification, which is in
     float64 also where precision is float32; with_sensitivity adds the derivatives by masses and inertias, one
-    more compiled program. Raises SearchInterrupted where `interrupted` said so, and
-    InputError with 64-bit floats off, unless precision is float32.
+    more compiled program. Of a CoDesign the plan is that of the robot chosen, `plan.problem.robot`.
+    Raises SearchInterrupted where `interrupted` said so, and InputError with 64-bit floats off, unless precision is
+    float32.
     """
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
@@ -115,7 +117,8 @@ def solve(
     phases, key = build_phases(optimizer, settings), jax.random.key(seed)
     with Stopwatch() as watch, ExitStack() as at_end:
         ahead = prepare_run(phases, problem, key, chunk=chunk, resume=resume)
-        ahead += _prepare_review(problem, step_factor, with_sensitivity)
+        planned = problem.problem if isinstance(problem, CoDesign) else problem
+        ahead += _prepare_review(planned, step_factor, with_sensitivity)
         for future in ahead:
             at_end.callback(future.cancel)
         outcome = run(
@@ -125,6 +128,8 @@ def solve(
             raise SearchInterrupted(outcome)
         with jax.enable_x64(True):
             free = np.asarray(outcome.best_position, dtype=float)
+            if isinstance(problem, CoDesign):
+                problem, free = jax.device_get(_chosen(problem, free))
             verified = _verified(problem, free, step_factor)
             code = _judged(problem, verified[2], np.array(_at_its_end(outcome)), tolerances)
             motion, terms, verification, trajectory = jax.device_get(verified)
@@ -135,7 +140,7 @@ def solve(
         result=result,
         cost=outcome.best_value,
         terms=terms,
-        free=outcome.best_position,
+        free=free,
         trajectory=trajectory,
         motion=motion,
         verification=verification,
@@ -146,6 +151,11 @@ def solve(
         seconds=watch.as_dict(),
         sensitivity=derivatives,
     )
+
+
+@jax.jit
+def _chosen(together: CoDesign, candidate: np.ndarray):
+    return together.split(candidate)
 
 
 @jax.jit

@@ -9,6 +9,7 @@ import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
+from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.kernels import FAST
@@ -29,8 +30,9 @@ class Problem:
 
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
     L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode
-    and kernel, static, are those of `jffsr.rollout`. All else is traced: problems of one robot with other numbers share
-    their compiled programs.
+    and kernel, static, are those of `jffsr.rollout`. With an uncertainty the index is measured over its robots; motion
+    and terms remain those of `robot`. All else is traced: problems of one robot with other numbers share their compiled
+    programs.
     """
 
     robot: Robot
@@ -41,16 +43,17 @@ class Problem:
     num_steps: int = field(default=100, metadata={"static": True})
     base_mode: str = field(default=FLOATING, metadata={"static": True})
     kernel: str = field(default=FAST, metadata={"static": True})
+    uncertainty: Uncertainty | None = None
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (k,) of the free numbers."""
         return self.trajectory.free_bounds()
 
-    def motion(self, candidate: Vector) -> Motion:
-        """The motion under the free numbers (k,)."""
+    def motion(self, candidate: Vector, robot: Robot | None = None) -> Motion:
+        """The motion under the free numbers (k,), of another robot where one is given."""
         trajectory = self.trajectory.with_free(candidate)
         return rollout(
-            self.robot,
+            self.robot if robot is None else robot,
             trajectory,
             self.initial_state,
             num_steps=self.num_steps,
@@ -60,15 +63,25 @@ class Problem:
         )
 
     def value(self, candidate: Vector) -> Scalar:
-        """The published index."""
-        return self.objective.value(self.robot, self.motion(candidate))
+        """The published index, or its measure over the uncertain robots."""
+        if self.uncertainty is None:
+            return self._value(self.robot, candidate)
+        return self.uncertainty.measured(lambda robot: self._value(robot, candidate))
+
+    def _value(self, robot: Robot, candidate: Vector) -> Scalar:
+        return self.objective.value(robot, self.motion(candidate, robot))
 
     def smooth_and_value(self, candidate: Vector, looseness: Scalar | float = 1.0) -> tuple[Scalar, Scalar]:
-        """The smooth index and the published one, of the same motion."""
-        motion = self.motion(candidate)
+        """The smooth index and the published one, of the same motions."""
+
+        def both(robot: Robot) -> tuple[Scalar, Scalar]:
+            motion = self.motion(candidate, robot)
+            return self.objective.smooth(robot, motion, looseness), self.objective.value(robot, motion)
+
         return (
-            self.objective.smooth(self.robot, motion, looseness),
-            self.objective.value(self.robot, motion),
+            both(self.robot)
+            if self.uncertainty is None
+            else self.uncertainty.measured_smooth(both, looseness)
         )
 
     def terms(self, candidate: Vector) -> dict[str, TermValue]:

@@ -53,13 +53,13 @@ def result_code(
 ) -> Array:
     """The code as an int32 array; works under vmap. `converged` is whether the search had come to its end."""
     largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in _KINDS]))
-    finite = jnp.isfinite(verification.cost)
+    finite = jnp.isfinite(verification.cost) & jnp.isfinite(verification.measure)
     verified = (
         (verification.attitude_difference <= tolerances.attitude)
         & (verification.momentum_drift <= tolerances.momentum)
         & (verification.boundary_error <= tolerances.boundary)
     )
-    met = verification.cost <= problem.objective.accuracy
+    met = jnp.maximum(verification.cost, verification.measure) <= problem.objective.accuracy
     short = jnp.where(converged, ResultCode.ACCURACY_NOT_MET, ResultCode.NOT_CONVERGED)
     code = jnp.where(met, ResultCode.ACCURACY_MET, short)
     code = jnp.where(met & (largest > tolerances.limit), ResultCode.LIMITS_VIOLATED, code)
@@ -85,25 +85,30 @@ _KINDS = ("position", "rate", "acceleration", "excursion")
 def explain(code: int, problem: Problem, verification: Verification, tolerances: Tolerances) -> Result:
     """The sentence of advice that goes with a code; host only."""
     code = ResultCode(int(code))
-    cost, accuracy = float(verification.cost), float(problem.objective.accuracy)
+    cost = float(np.maximum(verification.cost, verification.measure))
+    accuracy, index = float(problem.objective.accuracy), "J"
+    if problem.uncertainty is not None:
+        index = f"J over {len(problem.uncertainty.robots.mass)} robots"
     broken = list(violations(problem, verification.overruns, tolerances))
     also = f"; limits violated: {', '.join(broken)}" if broken else "; every limit is kept"
     binding = _binding(verification)
     if code is ResultCode.ACCURACY_MET:
-        text = f"accuracy met: J = {cost:.4g} <= {accuracy:g}, and every limit is kept on the finer grid"
+        text = (
+            f"accuracy met: {index} = {cost:.4g} <= {accuracy:g}, and every limit is kept on the finer grid"
+        )
     elif code is ResultCode.LIMITS_VIOLATED:
         text = (
-            f"J = {cost:.4g} <= {accuracy:g}, but limits are violated: {', '.join(broken)}; lower the scale of "
+            f"{index} = {cost:.4g} <= {accuracy:g}, but limits are violated: {', '.join(broken)}; lower the scale of "
             f"that term, or allow more time"
         )
     elif code is ResultCode.ACCURACY_NOT_MET:
         text = (
-            f"accuracy not met: J = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search had converged, "
-            f"so allow more time or excursion, or try more starts"
+            f"accuracy not met: {index} = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search had "
+            f"converged, so allow more time or excursion, or try more starts"
         )
     elif code is ResultCode.NOT_CONVERGED:
         text = (
-            f"accuracy not met: J = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search was still "
+            f"accuracy not met: {index} = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search was still "
             f"moving when its budget ended, so raise the budget"
         )
     elif code is ResultCode.NOT_VERIFIED:

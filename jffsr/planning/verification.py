@@ -45,7 +45,8 @@ class Verification:
 
     attitude_difference, rad, and position_difference, m: largest between the two runs at common times;
     boundary_error: largest miss of the joint positions, rates and accelerations asked for at both ends;
-    momentum_drift: relative, from differenced poses; cost and terms: the published index of the finer run.
+    momentum_drift: relative, from differenced poses; cost and terms: the published index of the finer run;
+    measure: that over the uncertain robots at the planner's step, the same as cost where nothing is uncertain.
     """
 
     attitude_difference: Scalar
@@ -53,6 +54,7 @@ class Verification:
     boundary_error: Scalar
     momentum_drift: Scalar
     cost: Scalar
+    measure: Scalar
     terms: dict[str, TermValue]
     overruns: Overruns
 
@@ -74,12 +76,14 @@ def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[M
     angle = jnp.linalg.norm(quaternion_to_rotation_vector(error), axis=-1)
     distance = jnp.linalg.norm(finer.base_position[::step_factor] - motion.base_position, axis=-1)
     terms = problem.objective.breakdown(problem.robot, finer)
+    cost = problem.objective.value(problem.robot, finer)
     return motion, Verification(
         attitude_difference=jnp.max(angle),
         position_difference=jnp.max(distance),
         boundary_error=_boundary_error(trajectory),
         momentum_drift=momentum_drift(problem.robot, finer),
-        cost=problem.objective.value(problem.robot, finer),
+        cost=cost,
+        measure=cost if problem.uncertainty is None else problem.value(candidate),
         terms=terms,
         overruns=_overruns(problem.robot, problem.objective, finer),
     )

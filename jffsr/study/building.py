@@ -18,6 +18,7 @@ from jffsr.optimizers.registry import Settings
 from jffsr.planning.problem import Problem
 from jffsr.planning.reachability import check_duration_possible
 from jffsr.planning.result import Tolerances
+from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.loading import load_robot
 from jffsr.robots.robot import PRISMATIC, Robot
 from jffsr.robots.state import State
@@ -41,6 +42,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         num_steps=config.rollout.num_steps,
         base_mode=config.rollout.base_mode,
         kernel=config.rollout.kernel,
+        uncertainty=_uncertainty(config, robot),
     )
     _check_user_terms(config, problem)
     return problem
@@ -92,6 +94,21 @@ def build_tolerances(config: PlanningConfig) -> Tolerances:
         limit=wanted.limit_tolerance,
         attitude=wanted.attitude_tolerance,
         momentum=wanted.momentum_tolerance,
+    )
+
+
+def _uncertainty(config: PlanningConfig, robot: Robot) -> Uncertainty | None:
+    wanted = config.robust
+    if wanted.samples == 0:
+        return None
+    return Uncertainty.sampled(
+        robot,
+        wanted.samples,
+        wanted.measure,
+        level=wanted.level,
+        seed=wanted.seed,
+        width=wanted.width,
+        **wanted.deviations,
     )
 
 

@@ -24,6 +24,7 @@ from jffsr.study.config import load_config
 from jffsr.study.dataset import plan_dataset, save_dataset
 from jffsr.study.interrupt import Interrupt
 from jffsr.study.progress import progress_bar
+from jffsr.study.robust_summary import robust_summary
 from jffsr.study.run_folder import RunFolder, claim_run_folder
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.summary import plan_summary
@@ -150,5 +151,6 @@ def _summary(folder: RunFolder) -> dict[str, Any]:
 def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str]) -> None:
     """Write the arrays, then the summary, which marks the run as finished."""
     save_dataset(plan_dataset(found, config.name, phase_names), folder.result)
-    write_json(folder.summary, plan_summary(found, config.name, config.seed, build_tolerances(config)))
+    summary = plan_summary(found, config.name, config.seed, build_tolerances(config))
+    write_json(folder.summary, summary | robust_summary(found, config.robust))
     folder.checkpoint.unlink(missing_ok=True)

@@ -12,7 +12,7 @@ from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
 from jffsr.study.schema_objective import TERMS, Objective
-from jffsr.study.schema_solver import Optimizer, Output, Rollout, Trajectory, Verification
+from jffsr.study.schema_solver import Optimizer, Output, Robust, Rollout, Trajectory, Verification
 from jffsr.study.schema_task import Limits, Task
 
 NAME = r"(?!\.+\Z)[A-Za-z0-9_.-]{1,100}"  # also the name of a folder, so not . or ..
@@ -29,6 +29,7 @@ class PlanningConfig(Section):
     trajectory: Trajectory = Trajectory()
     objective: Objective = Objective()
     rollout: Rollout = Rollout()
+    robust: Robust = Robust()
     optimizer: Optimizer = Optimizer()
     verification: Verification = Verification()
     output: Output = Output()

@@ -67,6 +67,32 @@ class Optimizer(Section):
         return self
 
 
+Deviation = Annotated[float, number(ge=0, le=0.5)]
+
+
+class Robust(Section):
+    """Planning against errors in the robot's numbers: relative standard deviations, and what counts of the index.
+
+    With samples at 0 the robot is taken to be what its file says.
+    """
+
+    samples: Annotated[int, whole(0, 100_000)] = 0
+    measure: Annotated[
+        Literal["expected", "worst_case", "cvar"], choice("expected", "worst_case", "cvar")
+    ] = "cvar"
+    level: Annotated[float, number(ge=0, le=1)] = 0.9  # cvar: the mean of the worst 1 - level
+    mass: Deviation = 0.05
+    inertia: Deviation = 0.05
+    length: Deviation = 0.01
+    width: Positive = 0.05  # of the rounding for gradients, in units of the index
+    seed: Annotated[int, whole(0, 2**32 - 2)] = 0
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Those of `jffsr.perturbed`."""
+        return {"mass": self.mass, "inertia": self.inertia, "length": self.length}
+
+
 class Verification(Section):
     """The finer re-run of a finished plan and what it must keep."""
 

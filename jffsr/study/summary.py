@@ -10,6 +10,7 @@ import numpy as np
 
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import violations
+from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
 _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
@@ -91,6 +92,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"momentum drift {_number(check['momentum_drift_relative'])}"
     )
     lines += sensitivity_lines(summary.get("sensitivity"))
+    lines += robust_lines(summary.get("robust"))
     crosscheck = check.get("mujoco")
     if crosscheck:
         lines.append(f"  simulators    {crosscheck['sentence']}")

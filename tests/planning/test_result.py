@@ -34,6 +34,7 @@ def verification(cost=0.5, overruns=INSIDE, **changes) -> Verification:
         "attitude_change": TermValue(np.array(1e-4), np.array(0.1 * cost)),
         "joint_rate": TermValue(np.array(1e-3), np.array(0.9 * cost)),
     }
+    numbers["measure"] = np.array(cost)
     return Verification(**(numbers | changes), cost=np.array(cost), terms=terms, overruns=overruns)
 
 
