@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import gc
 import os
 import sys
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from jffsr.study.planning import Run
 
 MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
+_NO_ROOM = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None))
 
 _DESCRIPTION = """\
 Plan the motion of free-floating space robots: satellites whose arms move while the thrusters are off.
@@ -57,12 +59,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of our output has gone; what was computed is already in its folder.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return MET
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            return _defect()
+        print(f"jffsr: {error.strerror}; make room and repeat the command", file=sys.stderr)
+        return BAD_INPUT
     except Exception:
-        traceback.print_exc()
-        print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
-        return DEFECT
+        return _defect()
     finally:
         gc.set_threshold(*often)
+
+
+def _defect() -> int:
+    traceback.print_exc()
+    print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
+    return DEFECT
 
 
 def _parser() -> argparse.ArgumentParser:

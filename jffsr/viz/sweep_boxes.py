@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 OPTIMIZER = "optimizer.kind"
 MOST_ROWS = 40
 _ROW = 0.2  # in
+_DEPTH = 1e-4  # as in a run's convergence: what lies deeper below the accuracy would flatten the rest
 _LABEL = 46  # letters
 
 
@@ -25,8 +26,9 @@ _LABEL = 46  # letters
 def draw_boxes(dataset: Dataset) -> Figure | None:
     """A box a setting, J on a logarithmic axis: quartiles, whiskers to the outermost runs, every run a dot.
 
-    dataset is a sweep's sweep.nc. Optimizers, where they are swept, have colours. None where there are no two settings
-    or more than fit on a page. Settings without a finite J are said to have none.
+    dataset is a sweep's sweep.nc. The axis ends four decades under the accuracy; runs further down are triangles at its
+    end. Optimizers, where they are swept, have colours. None where there are no two settings, or more than fit on a
+    page. A setting without a finite J is said to have none.
     """
     keys = keys_of(dataset)
     coloured = OPTIMIZER if OPTIMIZER in keys else None
@@ -40,18 +42,20 @@ def draw_boxes(dataset: Dataset) -> Figure | None:
     figure = new_figure(0.9 + _ROW * len(rows))
     axes = figure.subplots()
     ticks: dict[str, list[float]] = {}
-    place, last = 0.0, None
+    place, last, floor = 0.0, None, lowest(dataset)
     for row in rows:
         name = label(row.values, coloured)
         place += 1.0 if name == last or last is None else 1.5 if coloured else 1.0
         last = name
         ticks.setdefault(name, []).append(place)
         colour = level_look(levels.index(row.values[coloured]) if coloured else 0)["color"]
-        _box(axes, place, row, colour)
+        _box(axes, place, row, colour, floor)
     axes.set_yticks([float(np.mean(at)) for at in ticks.values()], list(ticks))
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(place + 0.8, 0.2)
     axes.set_xscale("log")
+    if any(np.any(row.cost <= floor) for row in rows):
+        axes.set_xlim(left=0.7 * floor)
     axes.set_xlabel("J [-]")
     _mark_accuracy(axes, float(dataset.attrs["accuracy"]))
     handles = [
@@ -77,8 +81,13 @@ def _short(value) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _box(axes, place: float, row: Row, colour: str) -> None:
-    cost = row.cost[np.isfinite(row.cost) & (row.cost > 0)]
+def lowest(dataset: Dataset) -> float:
+    """The least J that is drawn."""
+    return max(_DEPTH * float(np.nan_to_num(dataset.attrs["accuracy"])), 1e-300)
+
+
+def _box(axes, place: float, row: Row, colour: str, floor: float) -> None:
+    cost = np.maximum(row.cost[np.isfinite(row.cost)], floor)
     if not cost.size:
         axes.text(0.5, place, "no finite J", transform=axes.get_yaxis_transform(), va="center", color=GREY)
         return
@@ -88,7 +97,9 @@ def _box(axes, place: float, row: Row, colour: str) -> None:
     axes.plot([middle, middle], [place - 0.31, place + 0.31], color=colour, linewidth=1.4, zorder=3)
     # Spread by their order, so that equal ones are seen.
     offsets = np.linspace(-0.2, 0.2, cost.size) if cost.size > 1 else np.zeros(1)
-    axes.plot(cost, place + offsets, linestyle="none", marker="o", markersize=1.6, color="black", zorder=4)
+    deep = cost <= floor
+    axes.plot(cost[~deep], (place + offsets)[~deep], "o", markersize=1.6, color="black", zorder=4)
+    axes.plot(cost[deep], (place + offsets)[deep], "<", markersize=3, color=colour, clip_on=False, zorder=4)
 
 
 def _mark_accuracy(axes, accuracy: float) -> None:

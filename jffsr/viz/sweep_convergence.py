@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from jffsr.study.sweep.table import keys_of, rows_of
 from jffsr.viz.style import GREY, legend_above, level_look, new_figure, styled
-from jffsr.viz.sweep_boxes import OPTIMIZER, label
+from jffsr.viz.sweep_boxes import OPTIMIZER, label, lowest
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -24,8 +24,9 @@ _GRID = 200
 def draw_sweep_convergence(dataset: Dataset) -> Figure | None:
     """Median best J over the runs against objective and gradient evaluations together, with its quartiles.
 
-    A line for each optimizer, or else for each setting; a panel for each of the other settings, the first six. Nothing
-    is drawn until half of the runs have found a finite J. None where no step was kept or the lines are too many.
+    A line for each optimizer, or else for each setting; a panel for each of the other settings, the first six, whose
+    axis ends four decades under the accuracy. Nothing is drawn until half of the runs have found a finite J. None where
+    no step was kept or the lines are too many.
     """
     keys = keys_of(dataset)
     of_lines = [OPTIMIZER] if OPTIMIZER in keys else keys
@@ -50,10 +51,13 @@ def draw_sweep_convergence(dataset: Dataset) -> Figure | None:
             axes.axhline(
                 dataset.attrs["accuracy"], color=GREY, linestyle=(0, (4, 2)), linewidth=0.8, zorder=1
             )
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(max(bottom, lowest(dataset)), max(top, 10 * lowest(dataset)))
         if of_panels:
             axes.set_title(label(panel.values))
-    for axes in grid.flat[len(panels) :]:
-        axes.set_visible(False)
+    for number in range(len(panels), grid.size):
+        grid.flat[number].set_visible(False)
+        grid.flat[number - columns].tick_params(axis="x", labelbottom=True)
     figure.supxlabel("objective + gradient evaluations", fontsize=8)
     figure.supylabel("best J [-], median and quartiles", fontsize=8)
     if len(lines) > 1 or of_lines == [OPTIMIZER]:
@@ -70,7 +74,9 @@ def _draw(axes, runs: Dataset, look: dict) -> None:
         return
     at = np.geomspace(max(known.min(), 1), max(known.max(), 2), _GRID)
     values = np.stack([_held(one, cost, at) for one, cost in zip(spent, best, strict=True)])
-    lower, middle, upper = np.quantile(values, [0.25, 0.5, 0.75], axis=0, method="nearest")
+    middle = np.median(values, axis=0)
+    # Beside a run that has found nothing yet there is nothing to interpolate.
+    lower, upper = np.quantile(values, [0.25, 0.75], axis=0, method="nearest")
     half = np.isfinite(middle)
     axes.plot(at[half], middle[half], **look)
     full = half & np.isfinite(upper)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import shutil
+import signal
 
 import numpy as np
 import pytest
@@ -133,6 +135,22 @@ def test_cut_short_it_goes_on_to_the_same_bytes(parts, base, finished, tmp_path,
     assert {name: after[name] for name in before} == before
     assert (folder / "sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
     assert not list(folder.glob("parts/.*"))
+
+
+def test_ctrl_c_stops_after_the_call_under_way(base, finished, tmp_path, monkeypatch, capsys):
+    folder, save = tmp_path / "s", running.save_part
+
+    def save_then_signal(*arguments):
+        save(*arguments)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(running, "save_part", save_then_signal)
+        assert sweep(base, *SWEPT, out=folder) == cli.INTERRUPTED
+    assert f"the same command with --out {folder} goes on from it" in capsys.readouterr().err
+    assert list(parts_of(folder)) == ["0000000.npz"]
+    assert sweep(base, *SWEPT, out=folder) == cli.NOT_MET
+    assert (folder / "sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
 
 
 def test_a_damaged_part_is_computed_again(base, finished, tmp_path):

@@ -13,20 +13,16 @@ from jffsr.study.sweep.tasks import Task
 
 _PATIENCE = 5
 """s, in which a scheduler must answer."""
-_LOST_WORKERS = 10
-"""Workers that a task may take with it before it is called failed."""
 
 
 def connect(address: str) -> Any:
     """A client of the scheduler at `address`; InputError, within seconds, where there is none."""
     try:
-        import dask
         from distributed import Client
     except ImportError:
         raise InputError(
             "--scheduler needs dask.distributed: install it with pip install 'jffsr[cluster]'"
         ) from None
-    dask.config.set({"distributed.scheduler.allowed-failures": _LOST_WORKERS})
     # The library tells of every failed attempt; one sentence will do.
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.comm", "tornado", "asyncio")]
     before = [logger.level for logger in loggers]
@@ -54,7 +50,9 @@ def run_on_cluster(client: Any, tasks: Sequence[Task], interrupted: Callable[[],
         future = client.submit(compute, task, pure=False, key=f"jffsr-{task.numbers[0]}-{id(client)}")
         futures[future.key] = (task, future)
     try:
-        for future in as_completed([future for _, future in futures.values()]):
+        with client.as_current():
+            done = as_completed([future for _, future in futures.values()])
+        for future in done:
             task, _ = futures.pop(future.key)
             error = future.exception()
             if error is not None:

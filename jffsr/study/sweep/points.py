@@ -15,7 +15,7 @@ from jffsr.study.config import validated
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.sweep.specification import Specification
 
-MOST_POINTS = 1_000_000
+MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True)

@@ -102,8 +102,10 @@ def _run(
             except OSError as error:
                 raise _no_room(folder, error, len(done), len(points)) from None
             parts.append(Part(task.numbers, results))
+            before = 100 * len(done) // len(points)
             done.update(task.numbers)
-            say(f"  {len(done)} of {len(points)} points")
+            if 100 * len(done) // len(points) > before:
+                say(f"  {len(done)} of {len(points)} points")
     if ended < len(todo):
         return Sweep(folder, None, interrupted=True)
     try:

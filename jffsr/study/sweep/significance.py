@@ -73,7 +73,7 @@ def compare(dataset: Any, keys: list[str]) -> list[Comparison]:
     candidates = ["optimizer.kind"] if "optimizer.kind" in keys else keys if len(keys) == 1 else []
     found = []
     for key in candidates:
-        levels = list(dict.fromkeys(value.item() for value in dataset[key].values))
+        levels = list(dict.fromkeys(dataset[key].values.tolist()))
         if 2 <= len(levels) <= MOST_CHOICES:
             comparison = _comparison(dataset, key, levels, [other for other in keys if other != key])
             if comparison is not None:

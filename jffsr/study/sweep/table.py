@@ -36,10 +36,10 @@ def keys_of(dataset: Any, seeds: bool = False) -> list[str]:
 def rows_of(dataset: Any, keys: Sequence[str] | None = None) -> list[Row]:
     """A row for each combination of the keys' values (all but the seed), in the order of the points."""
     keys = keys_of(dataset) if keys is None else list(keys)
-    columns = [dataset[key].values for key in keys]
+    columns = [dataset[key].values.tolist() for key in keys]
     groups: dict[tuple, list[int]] = {}
     for point in range(dataset.sizes["point"]):
-        groups.setdefault(tuple(column[point].item() for column in columns), []).append(point)
+        groups.setdefault(tuple(column[point] for column in columns), []).append(point)
     rows = []
     for values, members in groups.items():
         points = np.array(members)
