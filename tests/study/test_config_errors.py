@@ -27,7 +27,7 @@ SEED = "a whole number in [0, 4294967295] is expected"
 KINDS = listed(f"'{kind}'" for kind in OPTIMIZERS)
 SWARMS = listed(f"'{kind}'" for kind in GENERATIONAL)
 TOP = (
-    "kind, name, robot, limits, task, trajectory, objective, constraints, rollout, optimizer, verification, "
+    "kind, name, robot, limits, task, trajectory, objective, constraints, rollout, robust, optimizer, verification, "
     "output, seed, precision"
 )
 
