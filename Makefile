@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics check-native check-distributed bench lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -55,8 +55,26 @@ bench:  ## time rollouts against everything else that computes them (QUICK=1: so
 	    || echo "Not all opponents could be installed; the table says which are missing." >&2
 	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks $(if $(QUICK),--quick --out runs/benchmarks/rollouts.md)
 
+compare: $(STAMP)  ## compare every optimizer on robots (goes on where it was stopped)
+	$(VENV_PYTHON) -m experiments.comparison
+
+bench-optimizers:  ## time a generation of each optimizer against evosax and pygmo
+	@$(MAKE) --no-print-directory venv VENV="$(BENCH_VENV)"
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(BENCH_VENV)/bin/python",\
+	    "$(BENCH_VENV)/bin/python" -m pip install --quiet --no-input --disable-pip-version-check) \
+	    pygmo -c constraints.txt || echo "pygmo could not be installed; the table leaves it out." >&2
+	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks.optimizers $(if $(QUICK),--quick --out runs/benchmarks/optimizers.md)
+
 check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
 	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)
+
+check-sweep: $(STAMP)  ## check that a sweep of 200 runs survives 20 kills
+	$(VENV_PYTHON) -m pytest -m sweep $(PYTEST_ARGS)
+
+check-cluster: $(STAMP)  ## check that a sweep on a dask cluster survives the loss of a worker
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(VENV_PYTHON)",\
+	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check) -e '.[cluster]' -c constraints.txt
+	$(VENV_PYTHON) -m pytest -m cluster $(PYTEST_ARGS)
 
 lint: $(STAMP)  ## check style and format
 	$(VENV_PYTHON) -m ruff check .
@@ -65,7 +83,7 @@ lint: $(STAMP)  ## check style and format
 # The list must not name a registry: whoever installs uses their own.
 constraints:  ## choose the pinned versions anew (needs uv)
 	@test -n "$(UV)" || { echo "make constraints needs uv on PATH (pip install uv)." >&2; exit 1; }
-	"$(UV)" pip compile --quiet --universal --upgrade --extra test --python-version 3.11 --no-header --no-annotate \
+	"$(UV)" pip compile --quiet --universal --upgrade --extra test --extra cluster --python-version 3.11 --no-header --no-annotate \
 	    --no-emit-index-url --no-emit-find-links --output-file constraints.txt pyproject.toml
 	@! grep -nE '://|^-| @ ' constraints.txt || { echo "constraints.txt names a registry or a path." >&2; exit 1; }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import gc
 import os
 import sys
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from jffsr.study.planning import Run
 
 MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
+_NO_ROOM = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None))
 
 _DESCRIPTION = """\
 Plan the motion of free-floating space robots: satellites whose arms move while the thrusters are off.
@@ -30,6 +32,7 @@ _EPILOG = """\
 examples:
   jffsr run configs/planning/composite_wu6.yaml
   jffsr run composite_wu6 optimizer.particles=64 task.duration=25 --out runs/faster
+  jffsr sweep composite_wu6 task.duration=20,25,30 seeds=20 --out runs/durations
   jffsr check runs/composite_wu6
   jffsr robots wu_6dof
 
@@ -56,12 +59,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of our output has gone; what was computed is already in its folder.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return MET
+    except OSError as error:
+        if error.errno not in _NO_ROOM:
+            return _defect()
+        print(f"jffsr: {error.strerror}; make room and repeat the command", file=sys.stderr)
+        return BAD_INPUT
     except Exception:
-        traceback.print_exc()
-        print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
-        return DEFECT
+        return _defect()
     finally:
         gc.set_threshold(*often)
+
+
+def _defect() -> int:
+    traceback.print_exc()
+    print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
+    return DEFECT
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -96,6 +108,8 @@ def _parser() -> argparse.ArgumentParser:
     together.add_argument("--process", metavar="I", type=int, help="which one this is, from 0")
     run.set_defaults(command=_run)
 
+    _add_sweep(commands)
+
     check = commands.add_parser(
         "check",
         help="re-verify a finished run with MuJoCo and MJX",
@@ -107,10 +121,10 @@ def _parser() -> argparse.ArgumentParser:
 
     show = commands.add_parser(
         "show",
-        help="print a finished run and draw its figures",
-        description="Print a finished run and draw it, as .png and, for a paper, as .pdf.",
+        help="print a finished run or sweep and draw its figures",
+        description="Print a finished run or sweep and draw it, as .png and, for a paper, as .pdf.",
     )
-    show.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
+    show.add_argument("run", metavar="RUN_DIR", help="the folder of a finished run or sweep")
     show.set_defaults(command=_show)
 
     robots = commands.add_parser(
@@ -132,9 +146,78 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _add_sweep(commands: argparse._SubParsersAction) -> None:
+    sweep = commands.add_parser(
+        "sweep",
+        help="run many studies that differ in a few keys",
+        description="Run every combination of the given values, together where they share their shapes; what was "
+        "finished before a kill is kept, and the same command with the same --out goes on.",
+    )
+    sweep.add_argument(
+        "config", metavar="CONFIG", help="a sweep's YAML file, or a planning configuration to sweep over"
+    )
+    sweep.add_argument(
+        "overrides",
+        metavar="KEY=V1,V2",
+        nargs="*",
+        help="the values of a key, for example task.duration=20,30; seeds=20 is twenty seeds",
+    )
+    sweep.add_argument(
+        "--out", metavar="DIR", help="the sweep's folder (default: the first free of runs/NAME, ...)"
+    )
+    sweep.add_argument(
+        "--together", metavar="N", type=int, help="points in one compiled call, at most (default: 64)"
+    )
+    sweep.add_argument(
+        "--workers",
+        metavar="N",
+        type=int,
+        help="processes for what shares no shapes (default: cores, at most 4)",
+    )
+    sweep.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="of a dask cluster that does the work, for example tcp://10.0.0.1:8786",
+    )
+    sweep.set_defaults(command=_sweep, coordinator=None, processes=None, process=None)
+
+
+def _sweep(arguments: argparse.Namespace) -> int:
+    from jffsr.study.sweep.specification import read_sweep
+
+    spec = read_sweep(arguments.config, arguments.overrides)
+    _prepare_jax()
+    _use_all_devices(arguments)
+    from jffsr.study.sweep.running import run_sweep
+
+    given = {name: getattr(arguments, name, None) for name in ("together", "workers", "scheduler")}
+    sweep = run_sweep(spec, arguments.out, say=print, **given)
+    path = sweep.folder.path
+    if sweep.interrupted:
+        print(
+            f"interrupted; what is finished is in '{path}', and the same command with --out {path} goes on from it",
+            file=sys.stderr,
+        )
+        return INTERRUPTED
+    if sweep.already_finished:
+        print(f"{path} is finished:")
+    elif sweep.figures:
+        from jffsr.viz.sweep import draw_sweep
+
+        draw_sweep(path, ["png"])
+    print(f"\n{sweep.table}\n{spec.name}: {sweep.summary['result']['sentence']}\n  folder  {path}")
+    if sweep.failures:
+        print(f"jffsr: {sweep.failures[0]}; the same command tries again", file=sys.stderr)
+        return DEFECT
+    return MET if sweep.summary["result"]["code"] == 0 else NOT_MET
+
+
 def _run(arguments: argparse.Namespace) -> int:
     from jffsr.study.config import load_config
+    from jffsr.study.sweep.specification import is_sweep
 
+    if is_sweep(arguments.config):
+        return _sweep(arguments)
     config = load_config(arguments.config, arguments.overrides)
     _prepare_jax(config.precision)
     first = _use_all_devices(arguments)
@@ -201,11 +284,19 @@ def _show(arguments: argparse.Namespace) -> int:
     _prepare_jax()
     from jffsr.study.run_folder import RunFolder
     from jffsr.study.summary import summary_text
-    from jffsr.viz.run import draw_run
 
-    files = draw_run(arguments.run)
     summary = RunFolder(Path(arguments.run)).read_summary()
-    print(summary_text(summary))
+    if summary.get("kind") == "sweep":
+        from jffsr.viz.sweep import draw_sweep
+
+        files = draw_sweep(arguments.run)
+        print((Path(arguments.run) / "table.md").read_text(encoding="utf-8"))
+        print(f"{summary['name']}: {summary['result']['sentence']}")
+    else:
+        from jffsr.viz.run import draw_run
+
+        files = draw_run(arguments.run)
+        print(summary_text(summary))
     print("  figures       " + "\n                ".join(str(file) for file in files))
     return MET
 

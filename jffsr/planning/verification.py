@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
 
 from jffsr.objectives.composite import CompositeIndex, TermValue
+from jffsr.objectives.constraints import largest_violation
 from jffsr.objectives.terms import AttitudeExcursion, attitude_angles
 from jffsr.objectives.torque_terms import JointTorque
 from jffsr.planning.problem import Problem
@@ -50,7 +51,8 @@ class Verification:
     attitude_difference, rad, and position_difference, m: largest between the two runs at common times;
     boundary_error: largest miss of the joint positions, rates and accelerations asked for at both ends;
     momentum_drift: relative, from differenced poses; cost and terms: the published index of the finer run;
-    measure: that over the uncertain robots at the planner's step, the same as cost where nothing is uncertain.
+    measure: that over the uncertain robots at the planner's step, the same as cost where nothing is uncertain;
+    violations: of each constraint by name, the largest in the finer run, zero where it is kept.
     """
 
     attitude_difference: Scalar
@@ -61,6 +63,7 @@ class Verification:
     measure: Scalar
     terms: dict[str, TermValue]
     overruns: Overruns
+    violations: dict[str, Scalar] = field(default_factory=dict)
 
 
 def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[Motion, Verification]:
@@ -92,6 +95,7 @@ def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[M
         measure=cost if problem.uncertainty is None else problem.value(candidate),
         terms=terms,
         overruns=_overruns(problem.robot, problem.objective, finer),
+        violations={c.name: largest_violation(c, problem.robot, finer) for c in problem.constraints},
     )
 
 

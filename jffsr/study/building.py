@@ -30,6 +30,7 @@ from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.loading import load_robot
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.study.building_constraints import build_constraints
 from jffsr.study.joint_laws import build_trajectory
 from jffsr.study.schema import PlanningConfig
 
@@ -51,6 +52,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         base_mode=config.rollout.base_mode,
         kernel=config.rollout.kernel,
         uncertainty=_uncertainty(config, robot),
+        constraints=build_constraints(config, robot),
     )
     _check_user_terms(config, problem)
     return problem
@@ -81,21 +83,7 @@ def build_robot(config: PlanningConfig) -> Robot:
 
 def build_settings(config: PlanningConfig) -> tuple[str, Settings]:
     """The registered optimizer's name and its settings."""
-    chosen = config.optimizer
-    return chosen.kind, Settings(
-        particles=chosen.particles,
-        evaluations=chosen.evaluations,
-        swarm_evaluations=chosen.swarm_evaluations,
-        contraction=chosen.contraction,
-        starts=chosen.starts,
-        gradient_iterations=chosen.gradient_iterations,
-        polish_iterations=chosen.polish_iterations,
-        looseness=chosen.looseness,
-        method=chosen.method,
-        learning_rate=chosen.learning_rate,
-        memory=chosen.memory,
-        target=chosen.target,
-    )
+    return config.optimizer.kind, config.optimizer.settings()
 
 
 def build_tolerances(config: PlanningConfig) -> Tolerances:

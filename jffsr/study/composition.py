@@ -34,8 +34,16 @@ def compose(path: Path, overrides: Sequence[str]) -> tuple[dict[str, Any], Sourc
         document.value.pop("name", None)
         document.marks.pop(("name",), None)
     main = len(documents) - 1
-    documents += [_override(text) for text in _checked(overrides)]
+    documents += [override(text) for text in _checked(overrides)]
     return _merge(documents, main), Sources(tuple(document.marks for document in documents), main)
+
+
+def compose_over(
+    values: dict[str, Any], sources: Sources, overrides: Sequence[Document]
+) -> tuple[dict[str, Any], Sources]:
+    """A composed mapping under further overrides, each a document of (dotted key, value)."""
+    layers = (*sources.layers, *(document.marks for document in overrides))
+    return _merge([Document(values, {}), *overrides], 0), Sources(layers, sources.main)
 
 
 def _collect(path: Path, above: list[Path], documents: list[Document]) -> None:
@@ -64,7 +72,7 @@ def _collect(path: Path, above: list[Path], documents: list[Document]) -> None:
         _collect(included, chain, documents)
         if len(documents) > MAX_FILES:
             raise InputError(f"{place}: the study builds on more than {MAX_FILES} files")
-    _anchor_robot(document.value, path.parent)
+    anchor_robot(document.value, path.parent)
     documents.append(document)
 
 
@@ -79,7 +87,7 @@ def _included(path: Path, name: Any, place: str) -> Path:
     raise InputError(f"{place}: there is no file '{name}' next to {path.name}{hint(Path(name).stem, there)}")
 
 
-def _anchor_robot(value: dict[str, Any], folder: Path) -> None:
+def anchor_robot(value: dict[str, Any], folder: Path) -> None:
     """Make a robot's path absolute: the composed study is written elsewhere and must still find it."""
     robot = value.get("robot")
     if isinstance(robot, str) and ("/" in robot or robot.endswith(_FILE_ENDINGS)) and "\0" not in robot:
@@ -95,8 +103,8 @@ def _checked(overrides: Sequence[str]) -> list[str]:
     return list(overrides)
 
 
-def _override(text: str) -> Document:
-    """A document whose value is (key, value)."""
+def override(text: str) -> Document:
+    """A document whose value is (dotted key, value), of a text `key=value`; raises InputError."""
     line = " ".join(text.split())
     source = f"override '{line if len(line) <= 80 else line[:77] + '...'}'"
     dotted, equals, value = text.partition("=")
@@ -109,7 +117,7 @@ def _override(text: str) -> Document:
     document = parse(value, source, key, with_lines=False)
     marks = document.marks or {key: Mark(source, None, "")}
     payload = {dotted: document.value}
-    _anchor_robot(payload, Path.cwd())
+    anchor_robot(payload, Path.cwd())
     return Document((dotted, payload[dotted]), marks)
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from typing import Any
 
 import yaml
 from pydantic import ValidationError
 
 from jffsr.errors import InputError
 from jffsr.reading.complaints import complaint
+from jffsr.reading.sources import Sources
 from jffsr.study.composition import compose
 from jffsr.study.lookup import find_config
 from jffsr.study.schema import PlanningConfig
@@ -25,9 +27,13 @@ def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] =
     what is expected.
     """
     path = find_config(path_or_name)
-    values, sources = compose(path, overrides)
+    return validated(*compose(path, overrides), path.stem)
+
+
+def validated(values: dict[str, Any], sources: Sources, stem: str) -> PlanningConfig:
+    """The configuration of a composed mapping, named after the stem where it has no name; raises InputError."""
     if values.get("name") is None:
-        values["name"] = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:100]
+        values["name"] = name_from(stem)
     if values.get("kind") is None:
         raise InputError(f"{sources.where('kind')}: missing, 'kind: planning' is expected")
     kind = values["kind"]
@@ -41,11 +47,19 @@ def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] =
     return config
 
 
+def name_from(stem: str) -> str:
+    """A study's name out of that of its file."""
+    return re.sub(r"[^A-Za-z0-9_.-]", "_", stem)[:100]
+
+
 def dump_config(config: PlanningConfig) -> str:
     """The resolved configuration as YAML, every default written out; load_config reads it as an equal one."""
-    return yaml.dump(
-        _plain(config.model_dump()), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110
-    )
+    return dump_values(config.model_dump())
+
+
+def dump_values(values: dict[str, Any]) -> str:
+    """Plain values as YAML that is read as equal ones."""
+    return yaml.dump(_plain(values), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
 
 
 class _Dumper(yaml.SafeDumper):

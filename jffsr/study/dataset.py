@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from jffsr.compiling import Program
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
+from jffsr.optimizers.constraints import split
 from jffsr.planning.plan import Plan
 from jffsr.writing import write_atomically
 
@@ -23,6 +25,11 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
 
     motion, robot = plan.motion, plan.problem.robot
     history = np.array(plan.history, dtype=float).reshape(-1, 5)
+    best, missed = history[:, 4], {}
+    if plan.problem.constraints:
+        best, violation = split(best, plan.free.dtype)
+        meaning = "violation of the constraints by the best so far"
+        missed["history_violation"] = ("iteration", violation, {"units": "1", "long_name": meaning})
     unit = "/".join(sorted({_SECOND[kind] for kind in robot.topology.joint_types}))
     excursion, measure = np.full(3, np.inf), ROTATION_VECTOR
     for term in plan.problem.objective.terms:
@@ -77,8 +84,9 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "history_gradient_evaluations": of(
                 "iteration", history[:, 3].astype(int), "1", "gradient evaluations"
             ),
-            "history_best_value": of("iteration", history[:, 4], "1", "best index so far"),
+            "history_best_value": of("iteration", best, "1", "best index so far"),
             "free_numbers": of("free", plan.free, "1", "free numbers of the trajectory"),
+            **missed,
         },
         coords={
             "time": ("time", np.asarray(motion.time), {"units": "s"}),
@@ -97,9 +105,16 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
     )
 
 
-def save_dataset(dataset, path: Path) -> None:
-    """Write a Dataset as netCDF-4 atomically."""
-    write_atomically(path, lambda part: dataset.to_netcdf(part, engine="h5netcdf"))
+def save_dataset(dataset, path: Path, encoding: dict | None = None) -> None:
+    """Write a Dataset as netCDF-4 atomically; encoding is xarray's. Raises OSError where there is no room for it."""
+    # HDF5 may end the process where the disk is full, so it writes to memory first.
+    buffer = io.BytesIO()
+    dataset.to_netcdf(buffer, engine="h5netcdf", encoding=encoding or {})
+
+    def write(part: Path) -> None:
+        part.write_bytes(buffer.getbuffer())
+
+    write_atomically(path, write)
 
 
 def open_dataset(path: Path):

@@ -99,7 +99,7 @@ def claim_run_folder(config: PlanningConfig, out: str | Path | None) -> RunFolde
     Without `out`, the first free of runs/NAME, runs/NAME-2, ... . InputError where `out` belongs to another
     configuration, or is not a run folder, or cannot be written.
     """
-    path = _free_name(Path("runs"), config.name) if out is None else Path(out)
+    path = free_name(Path("runs"), config.name) if out is None else Path(out)
     folder = RunFolder(path)
     text = dump_config(config)
     if path.is_dir() and any(path.iterdir()):
@@ -119,7 +119,7 @@ def claim_run_folder(config: PlanningConfig, out: str | Path | None) -> RunFolde
     return folder
 
 
-def _free_name(parent: Path, name: str) -> Path:
+def free_name(parent: Path, name: str) -> Path:
     candidate, number = parent / name, 1
     while candidate.exists():
         number += 1

@@ -11,6 +11,7 @@ from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
+from jffsr.study.schema_constraints import Constraints
 from jffsr.study.schema_objective import EFFORTS, TERMS, Objective
 from jffsr.study.schema_solver import Optimizer, Output, Robust, Rollout, Trajectory, Verification
 from jffsr.study.schema_task import Limits, Task
@@ -28,6 +29,7 @@ class PlanningConfig(Section):
     task: Task
     trajectory: Trajectory = Trajectory()
     objective: Objective = Objective()
+    constraints: Constraints = Constraints()
     rollout: Rollout = Rollout()
     robust: Robust = Robust()
     optimizer: Optimizer = Optimizer()
@@ -43,6 +45,9 @@ class PlanningConfig(Section):
         if self.objective.goal_attitude.enabled and self.task.goal_attitude is None:
             key = "objective.goal_attitude.enabled"
             raise conflict("found true, but no 'task.goal_attitude' is given", key)
+        if self.constraints.base_excursion is not None and self.limits.base_excursion_si is None:
+            sentence = "given, but 'limits.base_excursion_deg' (or 'base_excursion', in rad) is not"
+            raise conflict(sentence, "constraints.base_excursion")
         if not self.enabled_terms:
             sentence = "no term counts (an excursion only under a limit), at least one is expected"
             raise conflict(sentence, "objective")

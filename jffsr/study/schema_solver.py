@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Annotated, Literal
 
 from pydantic import model_validator
 
 from jffsr.dynamics.base_mode import BASE_MODES, FLOATING
+from jffsr.errors import InputError
+from jffsr.optimizers.hyperparameters import OptionError
+from jffsr.optimizers.registry import OPTIMIZERS, Settings, build_phases
 from jffsr.reading.section import Section
-from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
+from jffsr.reading.values import choice, conflict, flag, mapping, number, sequence, whole
 from jffsr.rollouts.kernels import FAST, KERNELS
 
 Positive = Annotated[float, number(gt=0)]
@@ -80,11 +84,11 @@ class Rollout(Section):
 
 
 class Optimizer(Section):
-    """The search; a swarm, gradients from several starts, or gradients from the best of a swarm."""
+    """The search: a population method, gradients from several starts, or gradients from the best of a swarm."""
 
-    kind: Annotated[Literal["qpso", "hybrid", "gradient"], choice("qpso", "hybrid", "gradient")] = "hybrid"
+    kind: Annotated[str, choice(*OPTIMIZERS)] = "hybrid"
     particles: Annotated[int, whole(2, 100_000)] = 50
-    evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # qpso: the whole budget
+    evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # all but hybrid and gradient: the whole budget
     swarm_evaluations: Annotated[int, whole(1, 10**9)] = 200  # hybrid: budget of the swarm phase
     contraction: Contraction = (1.0, 0.5)  # contraction-expansion coefficient: from, to
     starts: Annotated[int, whole(1, 10_000)] = 2  # gradient: starts; hybrid: best particles refined
@@ -96,20 +100,31 @@ class Optimizer(Section):
     memory: Annotated[int, whole(1, 1000)] = 10  # lbfgs
     target: Annotated[float, number(ge=0, instead=" or null")] | None = None
     chunk: Annotated[int, whole(1, 10**6)] = 10  # iterations between two looks of the host
+    options: Annotated[dict[str, float | int | str | bool], mapping("options of the optimizer")] = {}  # noqa: RUF012
 
     @model_validator(mode="after")
     def _check(self) -> Optimizer:
-        for kind, budget in (("hybrid", "swarm_evaluations"), ("qpso", "evaluations")):
-            value = getattr(self, budget)
-            if self.kind == kind and value < self.particles:
-                sentence = (
-                    f"found {value}, at least one for each of the {self.particles} particles is expected"
-                )
-                raise conflict(sentence, budget)
+        budget = "swarm_evaluations" if self.kind == "hybrid" else "evaluations"
+        value = getattr(self, budget)
+        if self.kind != "gradient" and value < self.particles:
+            sentence = f"found {value}, at least one for each of the {self.particles} particles is expected"
+            raise conflict(sentence, budget)
         if self.kind == "hybrid" and self.starts > self.particles:
             sentence = f"found {self.starts}, at most the number of particles ({self.particles}) is expected"
             raise conflict(sentence, "starts")
+        if self.options or self.kind not in ("qpso", "hybrid", "gradient"):
+            # These know best what they take; the others need not be loaded to tell.
+            try:
+                build_phases(self.kind, self.settings())
+            except OptionError as error:
+                raise conflict(error.sentence, f"options.{error.option}") from None
+            except InputError as error:
+                raise conflict(str(error), "particles" if "particles" in str(error) else "kind") from None
         return self
+
+    def settings(self) -> Settings:
+        """The same as the registry wants it."""
+        return Settings(**{f.name: getattr(self, f.name) for f in fields(Settings)})
 
 
 Deviation = Annotated[float, number(ge=0, le=0.5)]

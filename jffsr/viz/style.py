@@ -93,6 +93,11 @@ def line_look(index: int) -> dict:
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 
+def level_look(index: int) -> dict:
+    """The same of choice `index` of several that are compared; black is left to the runs' own marks."""
+    return {"color": COLOURS[1 + index % (len(COLOURS) - 1)], "linestyle": DASHES[index % len(DASHES)]}
+
+
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **options) -> Legend:
     """One legend above all axes, read row by row, in as few rows as the figure's width allows."""
     count = len(handles)

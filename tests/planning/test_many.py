@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import chex
@@ -125,3 +126,29 @@ def test_tables_hold_the_motion(problems, tmp_path):
     np.testing.assert_allclose(equal["joint_velocity"][10], rate, rtol=1e-12)
     with pytest.raises(InputError, match="period is 21 s"):
         plan.joint_table(21.0)
+
+
+def test_seeds_and_settings_of_their_own_are_those_of_single_plans(problems):
+    """Wherever a problem stands, and beside whichever others."""
+    sets = [replace(SETTINGS, contraction=(start, 0.5)) for start in (1.0, 0.8, 0.6)]
+    seeds = [7, 5, 7]
+    plans = plan_many(problems, "qpso", sets, seeds=seeds, with_history=True)
+    for i in range(3):
+        plan = solve(problems[i], "qpso", sets[i], seed=seeds[i], with_sensitivity=False)
+        np.testing.assert_allclose(plans.cost[i], plan.cost, rtol=1e-9)
+        np.testing.assert_allclose(
+            plans.history.best_value[i], [r.best_value for r in plan.history], rtol=1e-9
+        )
+        np.testing.assert_array_equal(plans.history.evaluations[i], [r.evaluations for r in plan.history])
+    again = plan_many(problems[::-1], "qpso", sets[::-1], seeds=seeds[::-1], with_history=True)
+    chex.assert_trees_all_close(again.cost[::-1], plans.cost, rtol=1e-9)
+
+
+def test_seeds_and_settings_that_do_not_fit_are_refused(problems):
+    for other in (replace(SETTINGS, particles=5), replace(SETTINGS, evaluations=60)):
+        with pytest.raises(InputError, match="settings 1 differ from settings 0"):
+            plan_many(problems, "qpso", [SETTINGS, other, SETTINGS])
+    with pytest.raises(InputError, match="2 settings were given for 3 problems"):
+        plan_many(problems, "qpso", [SETTINGS] * 2)
+    with pytest.raises(InputError, match="2 seeds were given for 3 problems"):
+        plan_many(problems, "qpso", SETTINGS, seeds=[1, 2])

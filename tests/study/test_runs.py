@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -167,6 +168,16 @@ def test_impossible_is_refused_before_any_search(small, tmp_path, capsys):
     for part in ("task.duration", "joint6", "55 deg", "0.2 rad/s^2", "4.38 s", "at least 5.09 s"):
         assert part in err
     assert not (tmp_path / "run").exists()
+
+
+def test_a_full_disk_is_told_in_one_sentence(small, tmp_path, capsys, monkeypatch):
+    def fill(*arguments, **keywords):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(planning, "run_planning", fill)
+    status, _, err = run(capsys, CONFIG, *small, "--out", str(tmp_path / "run"))
+    assert status == cli.BAD_INPUT
+    assert err == "jffsr: No space left on device; make room and repeat the command\n"
 
 
 def test_float32_is_searched_and_verified_in_float64(small, tmp_path):

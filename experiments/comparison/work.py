@@ -1,0 +1,134 @@
+"""The runs themselves: each search on each scenario with each seed, kept line by line as they end."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import jax
+import numpy as np
+
+from experiments.benchmarks.machine import describe_machine
+from experiments.comparison.profiles import SearchRun
+from experiments.comparison.scenarios import Scenario
+from experiments.comparison.searches import MEMBERS, STARTS, Search
+from jffsr.compiling import program
+from jffsr.optimizers.driver import Outcome, run
+from jffsr.optimizers.interface import sample_box
+from jffsr.parallel.devices import all_devices
+from jffsr.parallel.mapping import evaluate
+from jffsr.planning.problem import Problem
+
+_TURNS = 31
+
+
+def run_missing(
+    kept: Path, scenarios: Sequence[Scenario], searches: Sequence[Search], seeds: Sequence[int], budget: int
+) -> None:
+    """Append to the file every run that is not in it; the cost of a gradient is measured once a scenario."""
+    jax.config.update("jax_enable_x64", True)
+    lines = [json.loads(line) for line in kept.read_text().splitlines()] if kept.is_file() else []
+    done = {(line["scenario"], line["search"], line["seed"]) for line in lines if "search" in line}
+    charges = {line["scenario"]: line["gradient_charge"] for line in lines if "gradient_charge" in line}
+    with kept.open("a") as file:
+
+        def keep(line: dict[str, Any]) -> None:
+            file.write(json.dumps(line) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+        if not lines:
+            keep({"machine": describe_machine(), "budget": budget, "members": MEMBERS, "starts": STARTS})
+        for scenario in scenarios:
+            missing = [
+                (search, [seed for seed in seeds if (scenario.name, search.label, seed) not in done])
+                for search in searches
+            ]
+            if not any(left for _, left in missing):
+                continue
+            problem = scenario.problem()
+            if scenario.name not in charges:
+                charges[scenario.name] = _gradient_charge(problem)
+                keep(
+                    {
+                        "scenario": scenario.name,
+                        "about": scenario.about,
+                        "free": len(problem.bounds()[0]),
+                        "gradient_charge": charges[scenario.name],
+                    }
+                )
+            for search, left in missing:
+                _search(scenario.name, problem, search, left, budget, charges[scenario.name], keep)
+
+
+def _search(name: str, problem: Problem, search: Search, seeds, budget: int, charge: float, keep) -> None:
+    phases = search.phases(budget, charge)
+    for seed in seeds:
+        started = time.perf_counter()
+        found = run(phases, problem, jax.random.key(seed), chunk=50)
+        seconds = time.perf_counter() - started
+        keep(_line(name, search.label, seed, charge, found))
+        print(f"{name}, {search.label}, {seed}: {found.best_value:.4g}, {seconds:.1f} s", flush=True)
+
+
+def _line(scenario: str, search: str, seed: int, charge: float, found: Outcome) -> dict[str, Any]:
+    """A run as plain data: the best value where it fell, against the evaluations charged."""
+    charged = np.array([r.evaluations + charge * r.gradient_evaluations for r in found.history])
+    best = np.array([r.best_value for r in found.history])
+    fell = np.concatenate([[True], best[1:] < best[:-1]])
+    return {
+        "scenario": scenario,
+        "search": search,
+        "seed": seed,
+        "evaluations": found.evaluations,
+        "gradients": found.gradient_evaluations,
+        "charged_in_all": float(charged[-1]),
+        "charged": [round(float(x), 1) for x in charged[fell]],
+        "best": [float(f"{x:.6g}") if np.isfinite(x) else None for x in best[fell]],
+    }
+
+
+def read_runs(kept: Path) -> tuple[list[SearchRun], dict[str, Any]]:
+    """The runs, and the other lines of the file: the machine, and each scenario's facts by its name."""
+    runs, facts = [], {"scenarios": {}}
+    for line in map(json.loads, kept.read_text().splitlines()):
+        if "search" in line:
+            best = np.array([np.inf if x is None else x for x in line["best"]])
+            runs.append(
+                SearchRun(line["scenario"], line["search"], line["seed"], np.array(line["charged"]), best)
+            )
+        elif "scenario" in line:
+            facts["scenarios"][line["scenario"]] = line
+        else:
+            facts |= line
+    return runs, facts
+
+
+@program()
+def _values(problem: Problem, points):
+    return evaluate(problem.value, points)
+
+
+@program()
+def _gradients(problem: Problem, points):
+    return evaluate(jax.value_and_grad(problem.smooth_and_value, has_aux=True), points)
+
+
+def _gradient_charge(problem: Problem) -> float:
+    """Time of a gradient over that of an objective, a candidate each, in the batches that the searches use."""
+    many = np.asarray(sample_box(jax.random.key(0), problem, MEMBERS))
+    few = np.asarray(sample_box(jax.random.key(1), problem, STARTS))
+    seconds: dict[Any, list[float]] = {_values: [], _gradients: []}
+    with all_devices():
+        jax.block_until_ready((_values(problem, many), _gradients(problem, few)))  # compiles
+        for _ in range(_TURNS):  # in turn, so that a load on the machine meets both
+            for function, points in ((_values, many), (_gradients, few)):
+                started = time.perf_counter()
+                jax.block_until_ready(function(problem, points))
+                seconds[function].append((time.perf_counter() - started) / len(points))
+    return round(median(seconds[_gradients]) / median(seconds[_values]), 3)
