@@ -70,9 +70,15 @@ class Problem:
             base_mode=self.base_mode,
             kernel=self.kernel,
         )
-        if not self.objective.needs_torque:
+        if not self.needs_torque:
             return motion
         return with_joint_torque(robot, motion, self.kernel)
+
+    @property
+    def needs_torque(self) -> bool:
+        """Whether the index or a constraint reads the joint torques, which motions then carry."""
+        constrained = any(getattr(constraint, "needs_torque", False) for constraint in self.constraints)
+        return constrained or self.objective.needs_torque
 
     def value(self, candidate: Vector) -> Scalar:
         """The published index, or its measure over the uncertain robots."""

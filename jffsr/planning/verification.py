@@ -78,7 +78,7 @@ def verify(problem: Problem, candidate: Vector, step_factor: int = 4) -> tuple[M
         momentum=problem.momentum,
         base_mode=problem.base_mode,
     )
-    if problem.objective.needs_torque:
+    if problem.needs_torque:
         finer = with_joint_torque(problem.robot, finer, PLAIN)
     common = finer.base_quaternion[::step_factor]
     error = quaternion_multiply(quaternion_conjugate(common), motion.base_quaternion)

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from jffsr.errors import InputError
 from jffsr.objectives.constraints import BaseExcursion, Constraint, FinalAttitude, joint_limits
+from jffsr.objectives.torque_terms import TorqueLimit
 from jffsr.robots.robot import Robot
 from jffsr.study.schema import PlanningConfig
 
@@ -24,4 +26,12 @@ def build_constraints(config: PlanningConfig, robot: Robot) -> tuple[Constraint,
         limit, tolerance = config.limits.base_excursion_si, wanted.base_excursion.tolerance
         measure = config.objective.attitude_measure
         found.append(BaseExcursion(np.array(limit), tolerance=np.asarray(tolerance), measure=measure))
+    if wanted.torque_limit is not None:
+        limit = robot.limits.torque
+        if not np.any(np.isfinite(limit)):
+            raise InputError(
+                f"{config.where('constraints.torque_limit')}: given, but robot '{robot.name}' has no torque limits; "
+                f"give limits.torque"
+            )
+        found.append(TorqueLimit(limit, tolerance=np.asarray(wanted.torque_limit.tolerance)))
     return tuple(found)

@@ -73,9 +73,16 @@ class BaseExcursion(Section):
     tolerance: Positive = 1e-3  # relative to the limit
 
 
+class TorqueLimit(Section):
+    """The torque limits as an inequality at the motion's samples."""
+
+    tolerance: Positive = 1e-3  # relative to the limit
+
+
 class Constraints(Section):
     """Equalities and inequalities on the motion."""
 
     final_attitude: FinalAttitude | None = None
     joint_limits: JointLimits | None = None
     base_excursion: BaseExcursion | None = None
+    torque_limit: TorqueLimit | None = None

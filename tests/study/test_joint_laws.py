@@ -88,6 +88,21 @@ def test_without_an_effort_or_a_limit_torques_are_not_computed():
     assert "joint_torque" in limited.enabled_terms
 
 
+def test_torque_limits_may_be_a_constraint():
+    text = PLANAR + "trajectory: {kind: polynomial}\nconstraints: {torque_limit: {tolerance: 0.01}}\n"
+    problem = build_problem(
+        load(text + "limits: {torque: [5, 3]}\nobjective: {joint_torque: {enabled: no}}\n")
+    )
+    (limit,) = problem.constraints
+    np.testing.assert_array_equal(limit.limit, [5, 3])
+    assert (limit.name, float(limit.tolerance)) == ("torque_limit", 0.01)
+    assert problem.needs_torque
+    with pytest.raises(
+        InputError, match=r"x.yaml:8: constraints.torque_limit: given, but robot 'hu_2011_planar2' has"
+    ):
+        build_problem(load(text))
+
+
 REFUSED = {
     "trajectory: {kind: sine_polynomial, degree: 7}\n": "x.yaml:7: trajectory.degree: found 7, the law "
     "'sine_polynomial' has no such number, leave it out",
@@ -129,5 +144,5 @@ def test_what_only_the_robot_can_refuse():
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_configurations_of_minimum_torque_are_built(path):
     problem = build_problem(load_config(path))
-    assert problem.objective.needs_torque
+    assert problem.needs_torque
     assert problem.trajectory.free_bounds()[0].size > 0
