@@ -14,6 +14,8 @@ from jffsr.study.sweep.tasks import Task
 
 STEPS_KEPT = 200
 """Steps of each search that are kept, spread evenly over it, its last one among them."""
+OVERRUN = "overrun_"
+"""What the names of the limits' overruns begin with."""
 
 Results = dict[str, np.ndarray]
 
@@ -90,8 +92,8 @@ def _results(plans: Plans) -> Results:
         "boundary_error": check.boundary_error,
         "momentum_drift": check.momentum_drift,
         **{
-            f"overrun_{kind}": np.max(getattr(check.overruns, kind), axis=-1)
-            for kind in ("position", "rate", "acceleration", "excursion")
+            f"{OVERRUN}{kind}": np.max(values, axis=-1, initial=-np.inf)
+            for kind, values in vars(check.overruns).items()
         },
         "terms": np.array(names),
         "term_value": np.stack([check.terms[name].value for name in names], axis=-1),

@@ -57,6 +57,11 @@ class Task:
         )
 
     @property
+    def queued(self) -> bool:
+        """Whether a worker process computes it, beside others, and not all devices of this one together."""
+        return self.width is None or self.width == 1
+
+    @property
     def title(self) -> str:
         """For messages."""
         if len(self.numbers) == 1:
@@ -94,7 +99,7 @@ def sort_into_tasks(points: Sequence[Point], together: int | None = None) -> lis
         width = math.ceil(len(members) / parts)
         for start in range(0, len(members), width):
             tasks.append(_task(members[start : start + width], None if alone else width))
-    return sorted(tasks, key=lambda task: (len(task.numbers) == 1, task.numbers[0]))
+    return sorted(tasks, key=lambda task: (task.queued, task.numbers[0]))
 
 
 def _task(members: list[tuple[Point, Setting]], width: int | None) -> Task:
