@@ -12,7 +12,7 @@ from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
 from jffsr.study.sweep.table import keys_of
 from jffsr.viz.style import new_figure, styled
-from jffsr.viz.sweep_boxes import OPTIMIZER
+from jffsr.viz.sweep_boxes import OPTIMIZER, lowest
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -27,7 +27,7 @@ def draw_map(dataset: Dataset) -> Figure | None:
     """Median J over the first two swept keys of at least two values, a panel for each optimizer.
 
     Each cell, where there is room, says the share of runs that met the accuracy. Medians are over everything else that
-    was swept. None where there are no two such keys.
+    was swept; the colours end four decades under the accuracy. None where there are no two such keys.
     """
     keys = [
         key for key in keys_of(dataset) if key != OPTIMIZER and 2 <= len(_levels(dataset, key)) <= MOST_LEVELS
@@ -41,7 +41,8 @@ def draw_map(dataset: Dataset) -> Figure | None:
     known = np.concatenate([cells[np.isfinite(cells) & (cells > 0)] for cells in medians])
     if not known.size:
         return None
-    norm = LogNorm(known.min(), max(known.max(), 1.001 * known.min()))
+    floor = max(known.min(), lowest(dataset))
+    norm = LogNorm(floor, max(known.max(), 10 * floor), clip=True)
     wide = max(1.2, min(0.34 * len(columns), 2.6))
     figure = new_figure(max(1.9, min(0.24 * len(rows) + 1.0, 4.0)), wide * len(panels) + 1.5)
     all_axes = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
@@ -58,7 +59,9 @@ def draw_map(dataset: Dataset) -> Figure | None:
         if len(columns) <= _WRITTEN:
             _write_shares(axes, cells, share, norm)
     all_axes[0].set_ylabel(up)
-    figure.colorbar(image, ax=all_axes, label="median J [-]")
+    figure.colorbar(
+        image, ax=all_axes, label="median J [-]", extend="min" if known.min() < floor else "neither"
+    )
     return figure
 
 
