@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench compare lint constraints clean
+.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -57,6 +57,13 @@ bench:  ## time rollouts against everything else that computes them (QUICK=1: so
 
 compare: $(STAMP)  ## compare every optimizer on robots (goes on where it was stopped)
 	$(VENV_PYTHON) -m experiments.comparison
+
+bench-optimizers:  ## time a generation of each optimizer against evosax and pygmo
+	@$(MAKE) --no-print-directory venv VENV="$(BENCH_VENV)"
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(BENCH_VENV)/bin/python",\
+	    "$(BENCH_VENV)/bin/python" -m pip install --quiet --no-input --disable-pip-version-check) \
+	    pygmo -c constraints.txt || echo "pygmo could not be installed; the table leaves it out." >&2
+	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks.optimizers $(if $(QUICK),--quick --out runs/benchmarks/optimizers.md)
 
 check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
 	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)

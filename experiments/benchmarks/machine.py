@@ -8,7 +8,18 @@ import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-PACKAGES = ("jax", "jaxlib", "numpy", "mujoco-mjx", "diffrax", "frax", "adam-robotics", "pin")
+PACKAGES = (
+    "jax",
+    "jaxlib",
+    "numpy",
+    "mujoco-mjx",
+    "diffrax",
+    "frax",
+    "adam-robotics",
+    "pin",
+    "evosax",
+    "pygmo",
+)
 
 
 def describe_machine() -> dict:

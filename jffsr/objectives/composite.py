@@ -51,6 +51,11 @@ class CompositeIndex:
     smoothing: Smoothing = field(default_factory=Smoothing)
     accuracy: float = 1.0
 
+    @property
+    def needs_torque(self) -> bool:
+        """Whether some term reads the joint torques, which a motion then should carry."""
+        return any(getattr(term, "needs_torque", False) for term in self.terms)
+
     def breakdown(self, robot: Robot, motion: Motion) -> dict[str, TermValue]:
         """Every term of the published index by name."""
         result = {}

@@ -31,6 +31,7 @@ from jffsr.spatial.rotation import (
     quaternion_to_rotation_vector,
     rounded_rotation_vector,
 )
+from jffsr.spatial.safe import peak, smooth_hinge, smooth_max
 from jffsr.types import Array, Quaternion, Scalar, Vector
 
 ROTATION_VECTOR = "rotation_vector"
@@ -90,6 +91,41 @@ class AttitudeChange:
         width = smoothing.norm * self.scale
         angles = _smooth_attitude_angles(motion, self.measure, width / 2)
         return smooth_error_norm(angles[-1], self.scale, smoothing)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class JointPosition:
+    """Sum over joints of the overrun of [lower, upper], (n,) each, relative to half that range: eq. (39)'s form.
+
+    Infinite where there is no limit; where only one end is, overruns of the other are in rad or m. For joint laws
+    that do not keep position limits by themselves.
+    """
+
+    scale: Array
+    lower: Array
+    upper: Array
+    name: str = field(default="joint_position", metadata={"static": True})
+
+    def _beyond(self, motion: Motion) -> Array:
+        """How far (2, K, n) the motion is above the upper and below the lower limits, relative; -1 without one."""
+        q, lower, upper = motion.joint_grid.joint_position, jnp.asarray(self.lower), jnp.asarray(self.upper)
+        both = jnp.isfinite(lower) & jnp.isfinite(upper)
+        half = jnp.where(both, (jnp.where(both, upper, 1.0) - jnp.where(both, lower, -1.0)) / 2, 1.0)
+        above = jnp.where(jnp.isfinite(upper), (q - upper) / half, -1.0)
+        below = jnp.where(jnp.isfinite(lower), (lower - q) / half, -1.0)
+        return jnp.stack([above, below])
+
+    def value(self, robot: Robot, motion: Motion) -> Scalar:
+        """The overrun of the peaks."""
+        beyond = self._beyond(motion)
+        return jnp.sum(jnp.maximum(0.0, peak(beyond.reshape(-1, beyond.shape[-1]))))
+
+    def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
+        """The smooth form."""
+        beyond = self._beyond(motion)
+        largest = smooth_max(beyond.reshape(-1, beyond.shape[-1]), smoothing.peak)
+        return jnp.sum(smooth_hinge(largest, smoothing.overrun))
 
 
 @jax.tree_util.register_dataclass

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import numpy as np
 
 from jffsr.compiling import Program, program
 from jffsr.errors import InputError
+from jffsr.optimizers import history as history_of
+from jffsr.optimizers.history import Record
 from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
 from jffsr.parallel.devices import all_devices, on_all_devices
 from jffsr.types import Array
@@ -52,19 +54,9 @@ class Phase:
     stop: Stop = field(default_factory=Stop)
 
 
-class Record(NamedTuple):
-    """One iteration of the history; evaluations are counted from the start of the run."""
-
-    phase: int
-    iteration: int
-    evaluations: int
-    gradient_evaluations: int
-    best_value: float
-
-
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything a run needs to go on: the phase, its state, and the history so far."""
+    """Everything a run needs to go on: the phase, its state, and the history so far (thinned where it is long)."""
 
     phase: int
     state: Any
@@ -73,7 +65,10 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run found. `reason` is converged, budget, target or interrupted."""
+    """What a run found. `reason` is converged, budget, target or interrupted.
+
+    violation is of the best point's constraints, where `jffsr.minimize` was given some.
+    """
 
     best_position: np.ndarray
     best_value: float
@@ -82,6 +77,7 @@ class Outcome:
     history: tuple[Record, ...]
     reason: str
     population: Population
+    violation: float = 0.0
 
     @property
     def interrupted(self) -> bool:
@@ -155,7 +151,7 @@ def run(
             for row in zip(*jax.device_get(rows), strict=True):
                 if row[0] > last:
                     last = row[0]
-                    history.append(_record(index, before, *row))
+                    history_of.add(history, _record(index, before, *row))
             _tell(on_chunk, index, state, history)
         best = float(state.progress.best_value)
         reason = _reason(phase.stop, state.progress, best)

@@ -18,6 +18,7 @@ import jax.numpy as jnp
 import optax
 
 from jffsr.optimizers.box import from_box, to_box
+from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import (
     OptimizationProblem,
     Population,
@@ -86,8 +87,8 @@ class GradientDescent:
     objective is. starts, method and memory are static.
     """
 
-    gradient_tolerance: Array | float = 1e-8
-    value_tolerance: Array | float = 1e-9
+    gradient_tolerance: Array | float = number(1e-8, 0)
+    value_tolerance: Array | float = number(1e-9, 0)
     learning_rate: Array | float = 0.05
     looseness: Array | float = 1.0
     starts: int = field(default=4, metadata={"static": True})
@@ -155,9 +156,18 @@ class GradientDescent:
 
     def step(self, problem: OptimizationProblem, state: GradientState) -> GradientState:
         """One trial of every active start."""
+        evaluated = self._evaluate(problem, state.descent.trial, state.descent.inside)
+        return self.advanced(problem, state, *evaluated)
+
+    def advanced(
+        self, problem: OptimizationProblem, state: GradientState, smooth: Array, value: Array, gradient: Array
+    ) -> GradientState:
+        """The state after the trials, given the smooth values (k,), true values (k,) and gradients (k, d) there.
+
+        Gradients are by the unconstrained coordinates; what is not finite is +inf, with a gradient of zero.
+        """
         descent, progress = state.descent, state.progress
         trial, inside = descent.trial, descent.inside
-        smooth, value, gradient = self._evaluate(problem, trial, inside)
         lower, upper = problem.bounds()
         advanced = jax.vmap(self._advance)(descent, trial, smooth, gradient)
         improved = descent.active & (value < descent.best_value)

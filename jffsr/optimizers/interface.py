@@ -7,13 +7,15 @@ the state, which is therefore the checkpoint. One driver runs them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
+from jffsr.errors import InputError
 from jffsr.types import Array, Scalar, Vector
 
 
@@ -110,3 +112,15 @@ def sample_box(key: Array, problem: OptimizationProblem, count: int) -> Array:
     """Candidates (count, d) uniform in the box."""
     lower, upper = (jnp.asarray(bound, dtype=float) for bound in problem.bounds())
     return jax.random.uniform(key, (count, lower.shape[0]), minval=lower, maxval=upper)
+
+
+def box_of(bounds: tuple[Sequence[float], Sequence[float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper bounds (d,) as host arrays; InputError where they are no box."""
+    lower, upper = (np.array(bound, dtype=float) for bound in bounds)
+    if lower.ndim != 1 or lower.shape != upper.shape or lower.size == 0:
+        raise InputError(
+            f"bounds have shapes {lower.shape} and {upper.shape}; two vectors of one length are expected"
+        )
+    if not (np.all(np.isfinite(lower)) and np.all(np.isfinite(upper)) and np.all(lower <= upper)):
+        raise InputError("bounds must be finite, and no lower bound above its upper bound")
+    return lower, upper

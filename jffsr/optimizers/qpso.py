@@ -3,100 +3,82 @@
 Sun, Feng and Xu, "Particle swarm optimization with particles having quantum behavior", Congress on
 Evolutionary Computation 2004, as Li 2022 uses it, with what its steps misprint put right: the best is the
 arg min, the weight of the local attractor is drawn uniformly for each dimension, and the mean runs over the
-personal bests of the whole swarm.
+personal bests of the whole swarm. The weighted mean is that of Xi, Sun and Xu, "An improved quantum-behaved
+particle swarm optimization algorithm with weighted mean best position", Applied Mathematics and Computation
+205, 2008: better particles count more, from 1.5 down to 0.5 by rank.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
+import optax
 
-from jffsr.optimizers.interface import (
-    OptimizationProblem,
-    Population,
-    Progress,
-    better_of,
-    finite_or_inf,
-    no_progress,
-    sample_box,
-)
-from jffsr.parallel.mapping import evaluate
-from jffsr.types import Array
+from jffsr.optimizers.hyperparameters import choice, number
+from jffsr.optimizers.interface import OptimizationProblem
+from jffsr.optimizers.population import PopulationOptimizer, PopulationState, fraction_done
+from jffsr.optimizers.registry import LARGEST_CONTRACTION
+from jffsr.types import Array, Scalar
+
+RANK_WEIGHTS = (1.5, 0.5)
+"""Weights of the best and the worst particle in the weighted mean; those between fall linearly, their mean is 1."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class SwarmState:
-    """key; position (P, d), personal_best (P, d), personal_value (P,)."""
-
-    key: Array
-    position: Array
-    personal_best: Array
-    personal_value: Array
-    progress: Progress
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class QPSO:
+class QPSO(PopulationOptimizer):
     """The swarm; every particle moves about its attractor by a Laplace step of the mean best distance.
 
-    iterations, over which the contraction-expansion coefficient falls linearly from contraction_start to
-    contraction_end (it must stay under exp(0.5772) = 1.781 for the swarm to contract); particles is static.
+    Over `iterations` the contraction-expansion coefficient goes from contraction_start to contraction_end (it must
+    stay under exp(0.5772) = 1.781 for the swarm to contract), linearly, along a cosine or exponentially; `schedule`,
+    any optax schedule (generation -> coefficient), takes the place of all that. mean_best is plain, or weighted by
+    rank. A particle that would leave the box stops at its bound.
+    particles, shape, mean_best and schedule are static.
     """
 
     iterations: Array | float
-    contraction_start: Array | float = 1.0
-    contraction_end: Array | float = 0.5
+    contraction_start: Array | float = number(1.0, 0, LARGEST_CONTRACTION, inside=True)
+    contraction_end: Array | float = number(0.5, 0, LARGEST_CONTRACTION, inside=True)
     particles: int = field(default=50, metadata={"static": True})
+    shape: str = choice("linear", "linear", "cosine", "exponential", "constant")
+    mean_best: str = choice("plain", "plain", "weighted")
+    schedule: Callable[[Array], Array] | None = field(default=None, metadata={"static": True})
 
-    def init(
-        self, key: Array, problem: OptimizationProblem, population: Population | None = None
-    ) -> SwarmState:
-        """A swarm uniform in the box, a given population taking the first places; nothing is evaluated yet."""
-        key, draw = jax.random.split(key)
-        position = sample_box(draw, problem, self.particles)
-        if population is not None:
-            given = population.positions[: self.particles]
-            position = position.at[: given.shape[0]].set(given)
-        progress = no_progress(position[0])
-        return SwarmState(key, position, position, jnp.full(self.particles, jnp.inf), progress)
+    def contraction(self, generation: Array) -> Scalar:
+        """The contraction-expansion coefficient of a generation, counted from 0."""
+        if self.schedule is not None:
+            return self.schedule(generation)
+        start, end = self.contraction_start, self.contraction_end
+        fraction = fraction_done(generation, self.iterations)
+        if self.shape == "cosine":
+            return end + (start - end) * optax.cosine_decay_schedule(1.0, 1)(fraction)
+        if self.shape == "exponential":
+            return start * (end / start) ** fraction
+        if self.shape == "constant":
+            return jnp.asarray(start, dtype=float)
+        return start + (end - start) * fraction
 
-    def step(self, problem: OptimizationProblem, state: SwarmState) -> SwarmState:
-        """One generation: P evaluations where the swarm stands, then the move to where it goes next."""
-        progress = state.progress
-        value = finite_or_inf(evaluate(problem.value, state.position))
-        improved = value < state.personal_value
-        personal_best = jnp.where(improved[:, None], state.position, state.personal_best)
-        personal_value = jnp.where(improved, value, state.personal_value)
-        best_position, best_value = better_of(
-            progress.best_position, progress.best_value, personal_best, personal_value
-        )
-        position = self._move(problem, state, personal_best, best_position)
-        progress = replace(
-            progress,
-            best_position=best_position,
-            best_value=best_value,
-            iteration=progress.iteration + 1,
-            evaluations=progress.evaluations + self.particles,
-        )
-        return SwarmState(state.key, position, personal_best, personal_value, progress)
-
-    def _move(self, problem: OptimizationProblem, state: SwarmState, personal_best, best_position) -> Array:
-        iteration = state.progress.iteration
-        fraction = jnp.clip(iteration / jnp.maximum(self.iterations, 1), 0.0, 1.0)
-        contraction = self.contraction_start + (self.contraction_end - self.contraction_start) * fraction
-        mix, leap = jax.random.split(jax.random.fold_in(state.key, iteration))
+    def propose(
+        self, problem: OptimizationProblem, key: Array, generation: Array, state: PopulationState
+    ) -> tuple[Array, tuple]:
+        """Each particle about its attractor, between its own best and the swarm's."""
+        contraction = self.contraction(generation)
+        mix, leap = jax.random.split(key)
         phi = jax.random.uniform(mix, state.position.shape)
-        attractor = phi * personal_best + (1 - phi) * best_position
-        mean_best = jnp.mean(personal_best, axis=0)
+        attractor = phi * state.kept + (1 - phi) * state.progress.best_position
         # A random sign times log(1/u), u uniform in (0, 1], is a Laplace variable: one draw instead of two.
-        jump = jnp.abs(mean_best - state.position) * jax.random.laplace(leap, state.position.shape)
+        jump = jnp.abs(self._mean_best(state) - state.position) * jax.random.laplace(
+            leap, state.position.shape
+        )
         lower, upper = problem.bounds()
-        return jnp.clip(attractor + contraction * jump, lower, upper)
+        return jnp.clip(attractor + contraction * jump, lower, upper), state.own
 
-    def population(self, state: SwarmState) -> Population:
-        """The personal bests."""
-        return Population(state.personal_best, state.personal_value)
+    def _mean_best(self, state: PopulationState) -> Array:
+        if self.mean_best == "plain":
+            return jnp.mean(state.kept, axis=0)
+        falling = jnp.linspace(*RANK_WEIGHTS, self.particles)
+        weight = jnp.zeros(self.particles).at[jnp.argsort(state.kept_value)].set(falling)
+        return weight @ state.kept / self.particles

@@ -15,6 +15,8 @@ import numpy as np
 
 from jffsr.compiling import program
 from jffsr.errors import InputError
+from jffsr.objectives.constraints import Constraint
+from jffsr.optimizers.constraints import Evaluation
 from jffsr.planning.problem import Problem
 from jffsr.robots.design import Design, mounted_joints, no_change, redesigned
 from jffsr.types import Array, Scalar, Vector
@@ -69,6 +71,11 @@ class CoDesign:
             raise InputError(f"mount is {mount!r}; a distance of at least 0 m is expected")
         return cls(problem, *(np.asarray(x, dtype=float) for x in (length, mount, mass_exponent)))
 
+    @property
+    def constraints(self) -> tuple[Constraint, ...]:
+        """Those of the problem, which the robot that is chosen has to keep."""
+        return self.problem.constraints
+
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds of a candidate."""
         lower, upper = self.problem.bounds()
@@ -98,3 +105,8 @@ class CoDesign:
         """The smooth index and the published one."""
         problem, free = self.split(candidate)
         return problem.smooth_and_value(free, looseness)
+
+    def evaluation(self, candidate: Vector, looseness: Scalar | float = 1.0) -> Evaluation:
+        """Both, and the constraints."""
+        problem, free = self.split(candidate)
+        return problem.evaluation(free, looseness)

@@ -15,7 +15,7 @@ import numpy as np
 
 from jffsr.compiling import jit
 from jffsr.errors import InputError
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.registry import Settings
 from jffsr.parallel.devices import all_devices
 from jffsr.parallel.mapping import spread
 from jffsr.planning.fingerprint import fingerprint
@@ -23,6 +23,7 @@ from jffsr.planning.plan import check_precision
 from jffsr.planning.plans_file import load_plans, save_plans
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances, result_code, settled
+from jffsr.planning.search import search_of, searchable
 from jffsr.planning.verification import Verification, verify
 from jffsr.robots.stacking import first_unlike
 from jffsr.rollouts.motion import Motion
@@ -98,7 +99,7 @@ def plan_many(
     check_precision("float64")
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *problems)
     tolerances = tolerances or Tolerances()
-    alike, each, lengths = _optimizers(optimizer, settings or Settings(), len(problems))
+    alike, each, lengths = _optimizers(problems[0], optimizer, settings or Settings(), len(problems))
     count = len(problems)
     if seeds is not None and len(seeds) != count:
         raise InputError(f"{len(seeds)} seeds were given for {count} problems; one for each is expected")
@@ -144,14 +145,14 @@ def _joined(parts: list[Plans]) -> Plans:
 
 
 def _optimizers(
-    name: str, settings: Settings | Sequence[Settings], count: int
+    problem: Problem, name: str, settings: Settings | Sequence[Settings], count: int
 ) -> tuple[list | None, Any, tuple]:
     """Optimizers and stops of the phases, alike for all or stacked for each, and the phases' numbers of steps."""
     one = not isinstance(settings, Sequence)
     sets = [settings] if one else list(settings)
     if not one and len(sets) != count:
         raise InputError(f"{len(sets)} settings were given for {count} problems; one for each is expected")
-    phases = [build_phases(name, chosen) for chosen in sets]
+    phases = [search_of(problem, name, chosen)[0] for chosen in sets]
     lengths = [tuple(int(phase.stop.iterations) for phase in listed) for listed in phases]
     pairs = [[(phase.optimizer, phase.stop) for phase in listed] for listed in phases]
     if one:
@@ -175,16 +176,17 @@ def _optimizers(
 def _plan_chunk(batch, alike, seed, lengths, step_factor, tolerances, with_history):
     def one(item: tuple) -> Plans:
         problem, own, draw = item
+        searched = searchable(problem)
         optimizers = own if alike is None else alike
         key = jax.random.key(draw) if seed is None else jax.random.fold_in(jax.random.key(seed), draw)
         history = []
         population, evaluations, gradients = None, 0, 0
         for index, ((optimizer, stop), length) in enumerate(zip(optimizers, lengths, strict=True)):
-            state = optimizer.init(jax.random.fold_in(key, index), problem, population)
+            state = optimizer.init(jax.random.fold_in(key, index), searched, population)
 
             def step(state, _, optimizer=optimizer, stop=stop):
                 done = stop.reached(state.progress)
-                following = optimizer.step(problem, state)
+                following = optimizer.step(searched, state)
                 state = jax.tree.map(lambda old, new: jnp.where(done, old, new), state, following)
                 now = state.progress
                 counts = (now.evaluations, now.gradient_evaluations) if with_history else ()
@@ -204,7 +206,9 @@ def _plan_chunk(batch, alike, seed, lengths, step_factor, tolerances, with_histo
         ended = state.progress.converged | settled(history[0])
         return Plans(
             result=result_code(problem, verification, ended, tolerances),
-            cost=state.progress.best_value,
+            cost=problem.objective.value(problem.robot, motion)
+            if problem.constraints
+            else state.progress.best_value,
             free=free,
             motion=motion,
             verification=verification,

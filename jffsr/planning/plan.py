@@ -16,11 +16,13 @@ from jffsr.errors import InputError
 from jffsr.objectives.composite import TermValue
 from jffsr.optimizers.ahead import prepare_run
 from jffsr.optimizers.driver import Outcome, Record, Snapshot, run
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.history import before_last_tenth
+from jffsr.optimizers.registry import Settings
 from jffsr.planning.codesign import CoDesign
 from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Result, Tolerances, explain, result_code, settled
+from jffsr.planning.result import Result, Tolerances, explain, result_code, stands_still
+from jffsr.planning.search import search_of
 from jffsr.planning.sensitivity import Sensitivity, prepare_sensitivity, sensitivity
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
@@ -34,7 +36,9 @@ class Plan:
 
     cost and terms are the published index of the motion at the planner's own step; verification has them
     again at the finer one, by which `result` judges. free holds the chosen free numbers (k,). evaluations and
-    gradient_evaluations are counted apart; history has one record an iteration; seconds: compile, run, total.
+    gradient_evaluations are counted apart; history has one record an iteration, or of a long search those that bettered
+    the index, its values merits where there are constraints (`jffsr.optimizers.constraints.split`); seconds: compile,
+    run, total.
     sensitivity holds the derivatives by the robot's masses and inertias, None where they were not asked for.
     """
 
@@ -114,15 +118,15 @@ def solve(
     tolerances = tolerances or Tolerances()
     settings = settings or Settings()
     check_precision(precision)
-    phases, key = build_phases(optimizer, settings), jax.random.key(seed)
+    (phases, searched), key = search_of(problem, optimizer, settings), jax.random.key(seed)
     with Stopwatch() as watch, ExitStack() as at_end:
-        ahead = prepare_run(phases, problem, key, chunk=chunk, resume=resume)
+        ahead = prepare_run(phases, searched, key, chunk=chunk, resume=resume)
         planned = problem.problem if isinstance(problem, CoDesign) else problem
         ahead += _prepare_review(planned, step_factor, with_sensitivity)
         for future in ahead:
             at_end.callback(future.cancel)
         outcome = run(
-            phases, problem, key, chunk=chunk, resume=resume, on_chunk=on_chunk, interrupted=interrupted
+            phases, searched, key, chunk=chunk, resume=resume, on_chunk=on_chunk, interrupted=interrupted
         )
         if outcome.interrupted:
             raise SearchInterrupted(outcome)
@@ -138,7 +142,7 @@ def solve(
     return Plan(
         problem=problem,
         result=result,
-        cost=outcome.best_value,
+        cost=_cost(problem, outcome, terms, verification),
         terms=terms,
         free=free,
         trajectory=trajectory,
@@ -151,6 +155,17 @@ def solve(
         seconds=watch.as_dict(),
         sensitivity=derivatives,
     )
+
+
+def _cost(
+    problem: Problem, outcome: Outcome, terms: dict[str, TermValue], verification: Verification
+) -> float:
+    """The index of what was found; the search's own number is a merit where there are constraints."""
+    if not problem.constraints or not np.isfinite(outcome.best_value):
+        return outcome.best_value
+    if problem.uncertainty is not None:
+        return float(verification.measure)
+    return float(sum(term.weighted for term in terms.values()))
 
 
 @jax.jit
@@ -175,8 +190,10 @@ def _prepare_review(problem: Problem, step_factor: int, with_sensitivity: bool) 
 
 def _at_its_end(outcome: Outcome) -> bool:
     """Whether the search had stopped improving, by its own word or by its last steps."""
-    values = np.array([record.best_value for record in outcome.history])
-    return outcome.reason in ("converged", "target") or bool(settled(values))
+    if outcome.reason in ("converged", "target"):
+        return True
+    earlier = before_last_tenth(outcome.history)
+    return earlier is not None and bool(stands_still(earlier, outcome.history[-1].best_value))
 
 
 def check_precision(precision: str) -> None:

@@ -5,18 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
+from jffsr.objectives.constraints import Constraint, tolerance_of
+from jffsr.optimizers.constraints import Evaluation
 from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.joint_torque import with_joint_torque
 from jffsr.rollouts.kernels import FAST
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import rollout
 from jffsr.trajectories.interface import PlannedTrajectory
 from jffsr.types import Array, Scalar, Vector
+
+SEARCH_SHARE = 0.1
+"""What the search may use of an equality's tolerance; the rest is for the difference of the finer grid."""
 
 
 def _at_rest_at_origin() -> State:
@@ -26,7 +33,7 @@ def _at_rest_at_origin() -> State:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Choose the free numbers of `trajectory` so that the index of the motion is least.
+    """Choose the free numbers of `trajectory` so that the index of the motion is least under the constraints.
 
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
     L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode
@@ -44,6 +51,7 @@ class Problem:
     base_mode: str = field(default=FLOATING, metadata={"static": True})
     kernel: str = field(default=FAST, metadata={"static": True})
     uncertainty: Uncertainty | None = None
+    constraints: tuple[Constraint, ...] = ()
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (k,) of the free numbers."""
@@ -51,9 +59,10 @@ class Problem:
 
     def motion(self, candidate: Vector, robot: Robot | None = None) -> Motion:
         """The motion under the free numbers (k,), of another robot where one is given."""
+        robot = self.robot if robot is None else robot
         trajectory = self.trajectory.with_free(candidate)
-        return rollout(
-            self.robot if robot is None else robot,
+        motion = rollout(
+            robot,
             trajectory,
             self.initial_state,
             num_steps=self.num_steps,
@@ -61,6 +70,9 @@ class Problem:
             base_mode=self.base_mode,
             kernel=self.kernel,
         )
+        if not self.objective.needs_torque:
+            return motion
+        return with_joint_torque(robot, motion, self.kernel)
 
     def value(self, candidate: Vector) -> Scalar:
         """The published index, or its measure over the uncertain robots."""
@@ -82,6 +94,31 @@ class Problem:
             both(self.robot)
             if self.uncertainty is None
             else self.uncertainty.measured_smooth(both, looseness)
+        )
+
+    def evaluation(self, candidate: Vector, looseness: Scalar | float = 1.0) -> Evaluation:
+        """The smooth index, the published one, and all constraints in their order, of the same motion.
+
+        With an uncertainty the indices are measured over its robots; the constraints are those of the robot itself.
+        """
+        motion = self.motion(candidate)
+        if self.uncertainty is None:
+            smooth = self.objective.smooth(self.robot, motion, looseness)
+            value = self.objective.value(self.robot, motion)
+        else:
+            smooth, value = self.smooth_and_value(candidate, looseness)
+        equalities = [c.equality(self.robot, motion) for c in self.constraints]
+        allowed = [
+            jnp.broadcast_to(SEARCH_SHARE * jnp.asarray(tolerance_of(c)), found.shape)
+            for c, found in zip(self.constraints, equalities, strict=True)
+        ]
+        none = [jnp.zeros(0)]
+        return Evaluation(
+            smooth=smooth,
+            value=value,
+            equality=jnp.concatenate(none + equalities),
+            inequality=jnp.concatenate(none + [c.inequality(self.robot, motion) for c in self.constraints]),
+            tolerance=jnp.concatenate(none + allowed),
         )
 
     def terms(self, candidate: Vector) -> dict[str, TermValue]:

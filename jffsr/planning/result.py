@@ -9,9 +9,13 @@ from enum import IntEnum
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
 from jffsr.types import Array
+
+LIMIT_KINDS = ("position", "rate", "acceleration", "excursion", "torque")
+"""The limits that a plan is held to, as the fields of `Overruns` name them."""
 
 
 class ResultCode(IntEnum):
@@ -23,6 +27,7 @@ class ResultCode(IntEnum):
     NOT_CONVERGED = 3
     NOT_VERIFIED = 4
     NOT_FINITE = 5
+    CONSTRAINTS_VIOLATED = 6
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ def result_code(
     problem: Problem, verification: Verification, converged: Array, tolerances: Tolerances
 ) -> Array:
     """The code as an int32 array; works under vmap. `converged` is whether the search had come to its end."""
-    largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in _KINDS]))
+    largest = jnp.max(jnp.concatenate([getattr(verification.overruns, kind) for kind in LIMIT_KINDS]))
     finite = jnp.isfinite(verification.cost) & jnp.isfinite(verification.measure)
     verified = (
         (verification.attitude_difference <= tolerances.attitude)
@@ -63,6 +68,9 @@ def result_code(
     short = jnp.where(converged, ResultCode.ACCURACY_NOT_MET, ResultCode.NOT_CONVERGED)
     code = jnp.where(met, ResultCode.ACCURACY_MET, short)
     code = jnp.where(met & (largest > tolerances.limit), ResultCode.LIMITS_VIOLATED, code)
+    for constraint in problem.constraints:
+        kept = verification.violations[constraint.name] <= tolerance_of(constraint)
+        code = jnp.where(kept, code, ResultCode.CONSTRAINTS_VIOLATED)
     code = jnp.where(verified, code, ResultCode.NOT_VERIFIED)
     return jnp.where(finite, code, ResultCode.NOT_FINITE).astype(jnp.int32)
 
@@ -75,11 +83,12 @@ def settled(best_values: Array) -> Array:
     steps = best_values.shape[0]
     if steps < 2:
         return np.array(False)
-    earlier, last = best_values[-1 - max(1, steps // 10)], best_values[-1]
+    return stands_still(best_values[-1 - max(1, steps // 10)], best_values[-1])
+
+
+def stands_still(earlier: Array | float, last: Array | float) -> Array | bool:
+    """Whether the later of two best values is better by no more than 1 %."""
     return (abs(earlier) < np.inf) & (earlier <= last + 0.01 * abs(earlier))
-
-
-_KINDS = ("position", "rate", "acceleration", "excursion")
 
 
 def explain(code: int, problem: Problem, verification: Verification, tolerances: Tolerances) -> Result:
@@ -90,11 +99,16 @@ def explain(code: int, problem: Problem, verification: Verification, tolerances:
     if problem.uncertainty is not None:
         index = f"J over {len(problem.uncertainty.robots.mass)} robots"
     broken = list(violations(problem, verification.overruns, tolerances))
+    missed = ", ".join(constraints_missed(problem, verification))
     also = f"; limits violated: {', '.join(broken)}" if broken else "; every limit is kept"
     binding = _binding(verification)
     if code is ResultCode.ACCURACY_MET:
+        kept = "every limit and constraint is" if problem.constraints else "every limit is"
+        text = f"accuracy met: {index} = {cost:.4g} <= {accuracy:g}, and {kept} kept on the finer grid"
+    elif code is ResultCode.CONSTRAINTS_VIOLATED:
         text = (
-            f"accuracy met: {index} = {cost:.4g} <= {accuracy:g}, and every limit is kept on the finer grid"
+            f"constraints violated on the finer grid: {missed}; {index} = {cost:.4g}; allow more time or more free "
+            f"numbers, raise the budget of the gradients, or rollout.num_steps where the search had kept them"
         )
     elif code is ResultCode.LIMITS_VIOLATED:
         text = (
@@ -138,9 +152,17 @@ def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[
             yield f"{what.replace('_', ' ')} of {value:.3g}{unit} (allowed {allowed:g})"
 
 
+def constraints_missed(problem: Problem, verification: Verification) -> Iterator[str]:
+    """Each constraint that the finer run misses by more than its tolerance, and by how much."""
+    for constraint in problem.constraints:
+        missed, allowed = float(verification.violations[constraint.name]), float(tolerance_of(constraint))
+        if not missed <= allowed:
+            yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g})"
+
+
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:
     """Each limit that is overrun by more than the tolerance, with its joint or axis and by how much."""
-    for kind in _KINDS:
+    for kind in LIMIT_KINDS:
         names = "xyz" if kind == "excursion" else problem.robot.joint_names
         of = "base attitude excursion about" if kind == "excursion" else f"{kind} of"
         for name, overrun in zip(names, np.asarray(getattr(overruns, kind)), strict=True):

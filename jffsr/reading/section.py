@@ -23,7 +23,7 @@ class Section(BaseModel):
 
     def key_of(self, quantity: str) -> str:
         """The key under which the quantity was given: `x_deg` or, also when it was not given, `x`."""
-        return f"{quantity}_deg" if getattr(self, f"{quantity}_deg") is not None else quantity
+        return f"{quantity}_deg" if getattr(self, f"{quantity}_deg", None) is not None else quantity
 
     def si(self, quantity: str) -> Any:
         """The quantity's value, degrees turned into radians at every depth; None when not given."""

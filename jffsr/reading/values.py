@@ -104,6 +104,17 @@ def sequence(phrase: str, low: int, high: int) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+def mapping(of: str) -> PlainValidator:
+    """A mapping of names to plain values, which its user checks."""
+
+    def check(value: Any) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise expected(f"a mapping of {of}")
+        return dict(value)
+
+    return PlainValidator(check)
+
+
 def either(one: Any, many: Any, is_many: Callable[[Any], bool]) -> Any:
     """The type of a key of two forms, told apart by `is_many` so that an error speaks of the form used."""
     first, second = UNION_SIGN + "one", UNION_SIGN + "many"

@@ -7,8 +7,8 @@ of one core of a processor with AVX-512, a seven-axis arm, float64, an evaluatio
   the joints further out are all that counts: 15 numbers pass from body to body, and no pose or velocity of a body
   is ever formed. That is less than half of the operations of a sum over bodies in the base frame (with polynomials
   for sine and cosine 7,700 rollouts of 200 steps a second on two cores, instead of 1,800).
-* Each body's frame is turned so that z is its joint's axis (`_Inwards`): the joint's turn is then a plane rotation,
-  and its rate adds three products to the momentum.
+* Each body's frame is turned so that z is its joint's axis (`JointConstants`): the joint's turn is then a plane
+  rotation, and its rate adds three products to the momentum.
 * Every component is an array over the grid, so that each operation is one long loop that the compiler can put into
   vector registers (`spatial.components`), of 512 bits (`jffsr.compiling`: 100 ns instead of 128); sine and cosine
   are polynomials (`spatial.trigonometry`: under 5 ns for both instead of 18).
@@ -75,7 +75,7 @@ def hot_joint_terms(robot: Robot, joint_position: Array, joint_velocity: Array) 
     return jax.lax.optimization_barrier(terms)
 
 
-class _Carried(NamedTuple):
+class Carried(NamedTuple):
     """What a joint carries, about a point and in a frame that the step names; leaves (G,), mass ().
 
     mass; first, its first moment; inertia about the point; linear and angular, the momentum of the motion
@@ -89,7 +89,7 @@ class _Carried(NamedTuple):
     angular: Components
 
 
-class _Inwards(NamedTuple):
+class JointConstants(NamedTuple):
     """Constants of the joints, leaves (n, ...): the way from each body's frame to that of its parent.
 
     Frames are the bodies' own, turned so that z is the joint's axis. mass (n,), first (n, 3) and inertia
@@ -104,13 +104,13 @@ class _Inwards(NamedTuple):
     offset: Array
 
 
-def _constants(robot: Robot) -> _Inwards:
+def joint_constants(robot: Robot) -> JointConstants:
     mass, com = jnp.asarray(robot.mass)[1:], jnp.asarray(robot.link_com)
     turned = frame_along(jnp.asarray(robot.joint_axis))
     before = jnp.concatenate([jnp.eye(3, dtype=turned.dtype)[None], turned])[np.array(robot.topology.parents)]
     about_joint = jnp.asarray(robot.inertia)[1:] + mass[:, None, None] * parallel_axis(com)
     inertia = jnp.einsum("nji,njk,nkl->nil", turned, about_joint, turned)
-    return _Inwards(
+    return JointConstants(
         mass=mass,
         first=jnp.einsum("nji,nj->ni", turned, mass[:, None] * com),
         inertia=jnp.stack(symmetric_elements(inertia), axis=-1),
@@ -119,26 +119,26 @@ def _constants(robot: Robot) -> _Inwards:
     )
 
 
-def _inwards(robot: Robot, q: Array, qd: Array) -> _Carried:
+def _inwards(robot: Robot, q: Array, qd: Array) -> Carried:
     """What the base carries, about its centre of mass and in its frame, at joint positions and rates (n, G)."""
-    topology, constants = robot.topology, _constants(robot)
+    topology, constants = robot.topology, joint_constants(robot)
     zero = jnp.zeros_like(q[0])
-    nothing = _Carried(jnp.zeros_like(constants.mass[0]), (zero,) * 3, (zero,) * 6, (zero,) * 3, (zero,) * 3)
-    on_body: dict[int, list[_Carried]] = {}
-    for root, joints in reversed(_segments(topology)):
+    nothing = Carried(jnp.zeros_like(constants.mass[0]), (zero,) * 3, (zero,) * 6, (zero,) * 3, (zero,) * 3)
+    on_body: dict[int, list[Carried]] = {}
+    for root, joints in reversed(unbranched_parts(topology)):
         turning = topology.is_revolute[list(joints)]
         index = np.array(joints[::-1])
         inputs = jax.tree.map(lambda x, index=index: x[index], (constants, q, qd))
         if turning.any() and not turning.all():
             inputs = (*inputs, turning[::-1].copy())
         kind = turning[0] if len(inputs) == 3 else None
-        start = _sum(on_body.pop(joints[-1] + 1, [nothing]))
+        start = summed(on_body.pop(joints[-1] + 1, [nothing]))
         carried, _ = jax.lax.scan(lambda c, x, kind=kind: (_step(c, *x, kind=kind), None), start, inputs)
         on_body.setdefault(root, []).append(carried)
-    return _sum(on_body[0])
+    return summed(on_body[0])
 
 
-def _segments(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
+def unbranched_parts(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
     """Unbranched parts of the tree: the body that each hangs from, and its joints from there outwards."""
     children: dict[int, list[int]] = {}
     for joint, parent in enumerate(topology.parents):
@@ -157,19 +157,27 @@ def _segments(topology: Topology) -> list[tuple[int, tuple[int, ...]]]:
     return found
 
 
-def _sum(parts: list[_Carried]) -> _Carried:
+def summed(parts: list[Carried]) -> Carried:
     return jax.tree.map(lambda *x: sum(x[1:], start=x[0]), *parts)
 
 
-def _step(carried: _Carried, body: _Inwards, q: Array, qd: Array, turns=None, *, kind=None) -> _Carried:
-    """Take up one body and pass its joint: from about the outer joints to about the parent's frame.
+def _step(carried: Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> Carried:
+    """Take up one body and pass its joint: from about the outer joints to about the parent's frame."""
+    return passed(taken_up(carried, body), body, q, qd, turns, kind=kind)
+
+
+def taken_up(carried: Carried, body: JointConstants) -> Carried:
+    """With a body's own mass, first moment and inertia, in its frame and about its joint."""
+    first = add(carried.first, tuple(body.first))
+    inertia = tuple(a + b for a, b in zip(carried.inertia, tuple(body.inertia), strict=True))
+    return Carried(carried.mass + body.mass, first, inertia, carried.linear, carried.angular)
+
+
+def passed(state: Carried, body: JointConstants, q: Array, qd: Array, turns=None, *, kind=None) -> Carried:
+    """The same from a body's frame to its parent's, by a joint of this position and rate.
 
     kind says whether the joint turns (else it slides); None leaves it to `turns`, a traced flag.
     """
-    mass = carried.mass + body.mass
-    first = add(carried.first, tuple(body.first))
-    inertia = tuple(a + b for a, b in zip(carried.inertia, tuple(body.inertia), strict=True))
-    state = _Carried(mass, first, inertia, carried.linear, carried.angular)
     if kind is None:
         # A joint of the other kind is passed at zero and at rest.
         state = _slid(state, jnp.where(turns, 0.0, q), jnp.where(turns, 0.0, qd))
@@ -179,7 +187,7 @@ def _step(carried: _Carried, body: _Inwards, q: Array, qd: Array, turns=None, *,
     return jax.lax.optimization_barrier(_placed(state, body.rotation, tuple(body.offset)))
 
 
-def _turned(c: _Carried, q: Array, qd: Array) -> _Carried:
+def _turned(c: Carried, q: Array, qd: Array) -> Carried:
     """After a turn about z: the rate's momentum added, all components turned."""
     x, y, z = c.first
     xx, yy, zz, xy, xz, yz = c.inertia
@@ -197,10 +205,10 @@ def _turned(c: _Carried, q: Array, qd: Array) -> _Carried:
     double_cosine, double_sine = cosine * cosine - sine * sine, 2 * sine * cosine
     spread = double_cosine * half - double_sine * xy
     inertia = (mean + spread, mean - spread, zz, double_sine * half + double_cosine * xy, *turn(xz, yz))
-    return _Carried(c.mass, (*turn(x, y), z), inertia, (*turn(px, py), pz), (*turn(lx, ly), lz))
+    return Carried(c.mass, (*turn(x, y), z), inertia, (*turn(px, py), pz), (*turn(lx, ly), lz))
 
 
-def _slid(c: _Carried, q: Array, qd: Array) -> _Carried:
+def _slid(c: Carried, q: Array, qd: Array) -> Carried:
     """After a slide along z."""
     x, y, z = c.first
     xx, yy, zz, xy, xz, yz = c.inertia
@@ -211,10 +219,10 @@ def _slid(c: _Carried, q: Array, qd: Array) -> _Carried:
     # And now about the point that the joint started from.
     shift = q * (2 * z + c.mass * q)
     inertia = (xx + shift, yy + shift, zz, xy, xz - q * x, yz - q * y)
-    return _Carried(c.mass, (x, y, z + c.mass * q), inertia, (px, py, pz), (lx - q * py, ly + q * px, lz))
+    return Carried(c.mass, (x, y, z + c.mass * q), inertia, (px, py, pz), (lx - q * py, ly + q * px, lz))
 
 
-def _placed(c: _Carried, rotation: Array, offset: Components) -> _Carried:
+def _placed(c: Carried, rotation: Array, offset: Components) -> Carried:
     """In the parent's frame and about its origin."""
     rows: Rows = tuple(tuple(rotation[r, k] for k in range(3)) for r in range(3))
     first, linear = rows_times(rows, c.first), rows_times(rows, c.linear)
@@ -229,4 +237,4 @@ def _placed(c: _Carried, rotation: Array, offset: Components) -> _Carried:
     own = symmetric_turned(rows, c.inertia)
     constant = point_inertia(offset)
     inertia = tuple(o + m + c.mass * k for o, m, k in zip(own, mixed, constant, strict=True))
-    return _Carried(c.mass, add(first, scale(c.mass, offset)), inertia, linear, angular)
+    return Carried(c.mass, add(first, scale(c.mass, offset)), inertia, linear, angular)

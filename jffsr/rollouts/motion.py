@@ -34,8 +34,9 @@ class Motion:
     time (N + 1,), s; base_position (N + 1, 3), m, and base_quaternion (N + 1, 4), B to I; base_twist
     (N + 1, 6), [linear; angular] in I; joint_position, joint_velocity, joint_acceleration (N + 1, n);
     momentum (6,), P and L about the system centre of mass; joint_grid, the same joint motion on the finer
-    grid of 2N + 1 points, from which peaks are read. base_mode, static, says how the base was held: with the
-    attitude held only P is the robot's own, on a fixed base neither.
+    grid of 2N + 1 points, from which peaks are read. joint_torque (N + 1, n), N m or N, where `with_joint_torque` has
+    added it. base_mode, static, says how the base was held: with the attitude held only P is the robot's own, on a
+    fixed base neither.
     """
 
     time: Array
@@ -47,6 +48,7 @@ class Motion:
     joint_acceleration: Array
     momentum: Array
     joint_grid: JointGrid
+    joint_torque: Array | None = None
     base_mode: str = field(default=FLOATING, metadata={"static": True})
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 
 import jax
@@ -13,23 +14,31 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.objectives.composite import CompositeIndex, composite_index
 from jffsr.objectives.smoothing import Smoothing
-from jffsr.objectives.terms import UserTerm
+from jffsr.objectives.terms import JointPosition, Term, UserTerm
+from jffsr.objectives.torque_terms import (
+    AttitudePenalty,
+    JointTorque,
+    MechanicalWork,
+    PeakTorque,
+    TorqueEnergy,
+    TorqueIntegral,
+)
 from jffsr.optimizers.registry import Settings
 from jffsr.planning.problem import Problem
-from jffsr.planning.reachability import check_duration_possible
 from jffsr.planning.result import Tolerances
 from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.loading import load_robot
-from jffsr.robots.robot import PRISMATIC, Robot
+from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.study.building_constraints import build_constraints
+from jffsr.study.joint_laws import build_trajectory
 from jffsr.study.schema import PlanningConfig
-from jffsr.trajectories.sine_polynomial import SinePolynomial
 
 
 def build_problem(config: PlanningConfig) -> Problem:
     """The planning problem; InputError with file, line and key where the robot and the task do not fit."""
     robot = build_robot(config)
-    trajectory = _trajectory(config, robot)
+    trajectory = build_trajectory(config, robot)
     task = config.task
     problem = Problem(
         robot=robot,
@@ -43,6 +52,7 @@ def build_problem(config: PlanningConfig) -> Problem:
         base_mode=config.rollout.base_mode,
         kernel=config.rollout.kernel,
         uncertainty=_uncertainty(config, robot),
+        constraints=build_constraints(config, robot),
     )
     _check_user_terms(config, problem)
     return problem
@@ -57,6 +67,7 @@ def build_robot(config: PlanningConfig) -> Robot:
     limits, n = robot.limits, robot.num_joints
     position = config.per_joint("position", n)
     rate, acceleration = config.per_joint("rate", n), config.per_joint("acceleration", n)
+    torque = config.per_joint("torque", n)
     changes = {}
     if position is not None:
         changes["position_lower"] = np.array([low for low, _ in position])
@@ -65,26 +76,14 @@ def build_robot(config: PlanningConfig) -> Robot:
         changes["velocity"] = np.array(rate)
     if acceleration is not None:
         changes["acceleration"] = np.array(acceleration)
+    if torque is not None:
+        changes["torque"] = np.array(torque)
     return robot.replace(limits=replace(limits, **changes))
 
 
 def build_settings(config: PlanningConfig) -> tuple[str, Settings]:
     """The registered optimizer's name and its settings."""
-    chosen = config.optimizer
-    return chosen.kind, Settings(
-        particles=chosen.particles,
-        evaluations=chosen.evaluations,
-        swarm_evaluations=chosen.swarm_evaluations,
-        contraction=chosen.contraction,
-        starts=chosen.starts,
-        gradient_iterations=chosen.gradient_iterations,
-        polish_iterations=chosen.polish_iterations,
-        looseness=chosen.looseness,
-        method=chosen.method,
-        learning_rate=chosen.learning_rate,
-        memory=chosen.memory,
-        target=chosen.target,
-    )
+    return config.optimizer.kind, config.optimizer.settings()
 
 
 def build_tolerances(config: PlanningConfig) -> Tolerances:
@@ -110,52 +109,6 @@ def _uncertainty(config: PlanningConfig, robot: Robot) -> Uncertainty | None:
         width=wanted.width,
         **wanted.deviations,
     )
-
-
-def _trajectory(config: PlanningConfig, robot: Robot) -> SinePolynomial:
-    task = config.task
-    start, goal = np.array(task.start_si), np.array(task.goal_si)
-    for quantity, value in (("start", start), ("goal", goal)):
-        _check_posture(config, robot, quantity, value)
-    shortest, longest = task.duration_range
-    check_duration_possible(robot, start, goal, longest, config.where("task.duration"))
-    return SinePolynomial.between(
-        start,
-        goal,
-        robot.limits.position_lower,
-        robot.limits.position_upper,
-        longest,
-        box=config.trajectory.box,
-        duration_bounds=(shortest, longest) if task.duration_is_free else None,
-        joint_names=robot.joint_names,
-    )
-
-
-def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: np.ndarray) -> None:
-    key = config.task.key_of(quantity)
-    where = config.where(f"task.{key}")
-    if value.size != robot.num_joints:
-        raise InputError(
-            f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints"
-        )
-    for i, name in enumerate(robot.joint_names):
-        low, high = robot.limits.position_lower[i], robot.limits.position_upper[i]
-        if not (np.isfinite(low) and np.isfinite(high)):
-            raise InputError(
-                f"{config.where('limits')}: {name} of robot '{robot.name}' has no position limits, which the "
-                f"sine-polynomial law needs; give limits.position_deg or limits.position"
-            )
-        if not low < value[i] < high:
-            slides = robot.topology.joint_types[i] == PRISMATIC
-            shown = [
-                x if slides or not key.endswith("_deg") else np.rad2deg(x) for x in (value[i], low, high)
-            ]
-            unit = "m" if slides else ("deg" if key.endswith("_deg") else "rad")
-            place = "on a limit of" if value[i] in (low, high) else "outside"
-            raise InputError(
-                f"{where}: {name}: {shown[0]:g} {unit} lies {place} its range [{shown[1]:g}, {shown[2]:g}] {unit}; "
-                f"a value strictly inside is expected"
-            )
 
 
 def _objective(config: PlanningConfig, robot: Robot) -> CompositeIndex:
@@ -190,8 +143,29 @@ def _objective(config: PlanningConfig, robot: Robot) -> CompositeIndex:
         end_effector=task.end_effector,
         smoothing=Smoothing(smoothing.norm, smoothing.peak, smoothing.overrun),
         accuracy=objective.accuracy,
-        extra=[_user_term(config, i) for i in range(len(objective.terms))],
+        extra=[
+            *_further_terms(config, robot),
+            *(_user_term(config, i) for i in range(len(objective.terms))),
+        ],
     )
+
+
+def _further_terms(config: PlanningConfig, robot: Robot) -> Iterator[Term]:
+    """The terms of joint torques, and those that only some joint laws need."""
+    objective, task, limits = config.objective, config.task, robot.limits
+    desired = task.base_quaternion if task.goal_attitude is None else task.goal_attitude
+    made = {
+        "joint_position": lambda scale: JointPosition(scale, limits.position_lower, limits.position_upper),
+        "joint_torque": lambda scale: JointTorque(scale, limits.torque),
+        "torque_integral": TorqueIntegral,
+        "torque_energy": TorqueEnergy,
+        "mechanical_work": MechanicalWork,
+        "peak_torque": PeakTorque,
+        "attitude_penalty": lambda scale: AttitudePenalty(scale, np.array(desired)),
+    }
+    for name, make in made.items():
+        if config.term_enabled(name):
+            yield make(np.asarray(getattr(objective, name).scale))
 
 
 def _user_term(config: PlanningConfig, index: int) -> UserTerm:

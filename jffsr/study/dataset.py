@@ -10,11 +10,13 @@ import numpy as np
 
 from jffsr.compiling import Program
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
+from jffsr.optimizers.constraints import split
 from jffsr.planning.plan import Plan
 from jffsr.writing import write_atomically
 
 _attitude_angles = Program(attitude_angles, static_argnums=1, once=True)
 _SECOND = {"revolute": "rad", "prismatic": "m"}
+_EFFORT = {"revolute": "N m", "prismatic": "N"}
 
 
 def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
@@ -23,6 +25,11 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
 
     motion, robot = plan.motion, plan.problem.robot
     history = np.array(plan.history, dtype=float).reshape(-1, 5)
+    best, missed = history[:, 4], {}
+    if plan.problem.constraints:
+        best, violation = split(best, plan.free.dtype)
+        meaning = "violation of the constraints by the best so far"
+        missed["history_violation"] = ("iteration", violation, {"units": "1", "long_name": meaning})
     unit = "/".join(sorted({_SECOND[kind] for kind in robot.topology.joint_types}))
     excursion, measure = np.full(3, np.inf), ROTATION_VECTOR
     for term in plan.problem.objective.terms:
@@ -34,6 +41,13 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
         dims = dims if isinstance(dims, tuple) else (dims,)
         return dims, np.asarray(values), {"units": units, "long_name": meaning}
 
+    torque = {}
+    if motion.joint_torque is not None:
+        force = "/".join(sorted({_EFFORT[kind] for kind in robot.topology.joint_types}))
+        torque = {
+            "joint_torque": of(("time", "joint"), motion.joint_torque, force, "joint torque"),
+            "joint_torque_limit": of("joint", limits.torque, force, "torque limit"),
+        }
     return xarray.Dataset(
         {
             "joint_position": of(("time", "joint"), motion.joint_position, unit, "joint position"),
@@ -41,6 +55,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "joint_acceleration": of(
                 ("time", "joint"), motion.joint_acceleration, f"{unit}/s^2", "joint acceleration"
             ),
+            **torque,
             "base_position": of(
                 ("time", "axis"), motion.base_position, "m", "base centre of mass, inertial frame"
             ),
@@ -69,8 +84,9 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "history_gradient_evaluations": of(
                 "iteration", history[:, 3].astype(int), "1", "gradient evaluations"
             ),
-            "history_best_value": of("iteration", history[:, 4], "1", "best index so far"),
+            "history_best_value": of("iteration", best, "1", "best index so far"),
             "free_numbers": of("free", plan.free, "1", "free numbers of the trajectory"),
+            **missed,
         },
         coords={
             "time": ("time", np.asarray(motion.time), {"units": "s"}),

@@ -12,11 +12,13 @@ from typing import Any
 import jax
 
 from jffsr.errors import InputError
+from jffsr.optimizers.constraints import split
 from jffsr.optimizers.driver import Snapshot
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.registry import Settings
 from jffsr.parallel.processes import any_process, first_does, is_first
 from jffsr.planning.plan import Plan, SearchInterrupted, solve
 from jffsr.planning.problem import Problem
+from jffsr.planning.search import search_of
 from jffsr.study.atomic import write_json
 from jffsr.study.building import build_problem, build_settings, build_tolerances
 from jffsr.study.checkpoint import load_checkpoint, save_checkpoint
@@ -92,15 +94,15 @@ def run_planning(
     if finished:
         return Run(folder, _summary(folder), already_finished=True)
     kind, settings = build_settings(config)
-    phases = build_phases(kind, settings)
+    phases, searched = search_of(problem, kind, settings)
     resume = None
     if begun:
-        resume = load_checkpoint(folder.checkpoint, phases, problem, jax.random.key(config.seed))
+        resume = load_checkpoint(folder.checkpoint, phases, searched, jax.random.key(config.seed))
         say(f"going on from {folder.checkpoint} ({resume.history[-1].evaluations} evaluations done)")
     if is_first():
         done = resume.history[-1] if resume else None
         folder.keep_metrics(done.evaluations if done else 0, done.gradient_evaluations if done else 0)
-    show, close = progress_bar(phases, config.output.progress and is_first())
+    show, close = progress_bar(phases, config.output.progress and is_first(), bool(problem.constraints))
 
     def on_chunk(snapshot: Snapshot) -> None:
         last = snapshot.history[-1]
@@ -110,7 +112,7 @@ def run_planning(
                 iteration=last.iteration,
                 evaluations=last.evaluations,
                 gradient_evaluations=last.gradient_evaluations,
-                best_value=last.best_value,
+                **_best(problem, last.best_value, snapshot.state.progress.best_position.dtype),
             )
         save_checkpoint(folder.checkpoint, snapshot)
         show(snapshot)
@@ -131,6 +133,14 @@ def run_planning(
     if is_first():
         _finish(folder, config, found, [phase.name for phase in phases])
     return Run(folder, _summary(folder))
+
+
+def _best(problem: Problem, found: float, dtype: Any) -> dict[str, float]:
+    """The best index so far, and where there are constraints how far they are missed."""
+    if not problem.constraints:
+        return {"best_value": found}
+    value, violation = split(found, dtype)
+    return {"best_value": float(value), "violation": float(violation)}
 
 
 def _claim(config: PlanningConfig, out: str | Path | None) -> tuple[RunFolder, bool, bool]:

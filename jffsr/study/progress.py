@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections.abc import Callable
 
+from jffsr.optimizers.constraints import split
 from jffsr.optimizers.driver import Phase, Snapshot
 
 
@@ -19,11 +20,13 @@ def expected_evaluations(phases: list[Phase]) -> int | None:
     return int(total) if math.isfinite(total) else None
 
 
-def progress_bar(phases: list[Phase], shown: bool) -> tuple[Callable[[Snapshot], None], Callable[[], None]]:
+def progress_bar(
+    phases: list[Phase], shown: bool, constrained: bool = False
+) -> tuple[Callable[[Snapshot], None], Callable[[], None]]:
     """A function that takes snapshots and draws them, and one that closes the bar.
 
-    The bar shows the phase, the best index, evaluations per second and the time left; it is drawn only on a
-    terminal.
+    The bar shows the phase, the best index (or how far constraints are missed), evaluations per second and the time
+    left; it is drawn only on a terminal.
     """
     from tqdm import tqdm
 
@@ -40,8 +43,16 @@ def progress_bar(phases: list[Phase], shown: bool) -> tuple[Callable[[Snapshot],
     def show(snapshot: Snapshot) -> None:
         last = snapshot.history[-1]
         bar.set_description(phases[snapshot.phase].name, refresh=False)
-        best = f"{last.best_value:.4g}" if math.isfinite(last.best_value) else "none yet"
-        bar.set_postfix_str(f"best J {best}", refresh=False)
+        bar.set_postfix_str(_best(snapshot, constrained), refresh=False)
         bar.update(last.evaluations + last.gradient_evaluations - bar.n)
 
     return show, bar.close
+
+
+def _best(snapshot: Snapshot, constrained: bool) -> str:
+    best, missed = snapshot.history[-1].best_value, 0.0
+    if constrained:
+        best, missed = split(best, snapshot.state.progress.best_position.dtype)
+    if missed > 0 and math.isfinite(missed):
+        return f"constraints missed by {missed:.2g}"
+    return f"best J {best:.4g}" if math.isfinite(best) else "best J none yet"

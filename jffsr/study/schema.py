@@ -11,7 +11,8 @@ from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
-from jffsr.study.schema_objective import TERMS, Objective
+from jffsr.study.schema_constraints import Constraints
+from jffsr.study.schema_objective import EFFORTS, TERMS, Objective
 from jffsr.study.schema_solver import Optimizer, Output, Robust, Rollout, Trajectory, Verification
 from jffsr.study.schema_task import Limits, Task
 
@@ -28,6 +29,7 @@ class PlanningConfig(Section):
     task: Task
     trajectory: Trajectory = Trajectory()
     objective: Objective = Objective()
+    constraints: Constraints = Constraints()
     rollout: Rollout = Rollout()
     robust: Robust = Robust()
     optimizer: Optimizer = Optimizer()
@@ -43,6 +45,9 @@ class PlanningConfig(Section):
         if self.objective.goal_attitude.enabled and self.task.goal_attitude is None:
             key = "objective.goal_attitude.enabled"
             raise conflict("found true, but no 'task.goal_attitude' is given", key)
+        if self.constraints.base_excursion is not None and self.limits.base_excursion_si is None:
+            sentence = "given, but 'limits.base_excursion_deg' (or 'base_excursion', in rad) is not"
+            raise conflict(sentence, "constraints.base_excursion")
         if not self.enabled_terms:
             sentence = "no term counts (an excursion only under a limit), at least one is expected"
             raise conflict(sentence, "objective")
@@ -62,6 +67,11 @@ class PlanningConfig(Section):
             return self.task.goal_attitude is None
         if name == "goal_attitude" and enabled is None:
             return self.task.goal_attitude is not None
+        if name == "joint_position" and enabled is None:
+            return not self.trajectory.keeps_position
+        if name == "joint_torque" and enabled is None:
+            efforts = (getattr(self.objective, effort).enabled for effort in EFFORTS)
+            return self.limits.torque is not None or any(efforts)
         if name == "attitude_excursion":
             return enabled and self.limits.base_excursion_si is not None
         return enabled
@@ -76,7 +86,7 @@ class PlanningConfig(Section):
         return self._sources.where(key)
 
     def per_joint(self, quantity: str, num_joints: int) -> tuple | None:
-        """The limit `position` ((low, high) each), `rate` or `acceleration` of each joint; rad or m, s.
+        """The limit `position` ((low, high) each), `rate`, `acceleration` or `torque` of each joint; rad or m, s, N.
 
         None when not given. Raises InputError when a list is given whose length is not the number of joints.
         """

@@ -15,12 +15,21 @@ FlagOrNull = Annotated[bool, flag()] | None
 
 TERMS = (
     "attitude_change",
+    "joint_position",
     "joint_rate",
     "joint_acceleration",
+    "joint_torque",
     "attitude_excursion",
     "goal_attitude",
     "tool_position",
+    "torque_integral",
+    "torque_energy",
+    "mechanical_work",
+    "peak_torque",
+    "attitude_penalty",
 )
+EFFORTS = ("torque_integral", "torque_energy", "mechanical_work", "peak_torque")
+"""Terms that a torque limit comes with."""
 
 
 class AttitudeChange(Section):
@@ -56,6 +65,34 @@ class Overrun(Section):
 
     scale: Positive = 0.01
     enabled: Flag = True
+
+
+class PositionOverrun(Section):
+    """Relative overrun of the position limits; enabled null: on for joint laws that do not keep them themselves."""
+
+    scale: Positive = 0.01
+    enabled: FlagOrNull = None
+
+
+class TorqueOverrun(Section):
+    """Relative overrun of the torque limits; enabled null: on beside an effort, or where limits.torque is given."""
+
+    scale: Positive = 0.01
+    enabled: FlagOrNull = None
+
+
+class Effort(Section):
+    """A measure of the torques, off by default: their integral, N m s, their energy, N^2 m^2 s, work, J, peak, N m."""
+
+    scale: Positive = 1.0
+    enabled: Flag = False
+
+
+class AttitudePenalty(Section):
+    """Squared angle from the base's final attitude to its goal (its start without one), rad^2; alpha is 1/scale."""
+
+    scale: Positive = 1e-6
+    enabled: Flag = False
 
 
 class GoalAttitude(Section):
@@ -100,11 +137,18 @@ class Objective(Section):
         Literal["rotation_vector", "euler_zxy"], choice("rotation_vector", "euler_zxy")
     ] = "rotation_vector"
     attitude_change: AttitudeChange = Field(default_factory=lambda: AttitudeChange(scale_deg=0.1))
+    joint_position: PositionOverrun = PositionOverrun()
     joint_rate: Overrun = Overrun()
     joint_acceleration: Overrun = Overrun()
+    joint_torque: TorqueOverrun = TorqueOverrun()
     attitude_excursion: Overrun = Overrun()
     goal_attitude: GoalAttitude = GoalAttitude()
     tool_position: ToolPosition = ToolPosition()
+    torque_integral: Effort = Effort()
+    torque_energy: Effort = Effort()
+    mechanical_work: Effort = Effort()
+    peak_torque: Effort = Effort()
+    attitude_penalty: AttitudePenalty = AttitudePenalty()
     terms: Annotated[tuple[OwnTerm, ...], sequence("a list of at most 100 terms {call: ...}", 0, 100)] = ()
     smoothing: Smoothing = Smoothing()
     accuracy: Annotated[float, number(ge=0)] = 1.0

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from typing import Annotated, Literal
 
 from pydantic import model_validator
 
 from jffsr.dynamics.base_mode import BASE_MODES, FLOATING
+from jffsr.errors import InputError
+from jffsr.optimizers.hyperparameters import OptionError
+from jffsr.optimizers.registry import OPTIMIZERS, Settings, build_phases
 from jffsr.reading.section import Section
-from jffsr.reading.values import choice, conflict, flag, number, sequence, whole
+from jffsr.reading.values import choice, conflict, flag, mapping, number, sequence, whole
 from jffsr.rollouts.kernels import FAST, KERNELS
 
 Positive = Annotated[float, number(gt=0)]
@@ -19,11 +23,56 @@ Coefficient = Annotated[float, number(gt=0, lt=1.781)]
 Contraction = Annotated[tuple[Coefficient, ...], sequence("a pair of numbers in (0, 1.781)", 2, 2)]
 
 
-class Trajectory(Section):
-    """The joint law and the half width of the box of its free numbers."""
+SINE_POLYNOMIAL, POLYNOMIAL, BSPLINE = "sine_polynomial", "polynomial", "bspline"
+_OF_LAW = {  # the keys that each joint law knows, with their defaults
+    SINE_POLYNOMIAL: {"box": math.pi},
+    POLYNOMIAL: {"degree": 7, "box": 2.0},
+    BSPLINE: {"degree": 4, "control_points": 8, "box": 2.0},
+}
 
-    kind: Annotated[Literal["sine_polynomial"], choice("sine_polynomial")] = "sine_polynomial"
-    box: Positive = math.pi
+
+class Trajectory(Section):
+    """The joint law, its size, and the half width of the box of its free numbers; null is the law's own default."""
+
+    kind: Annotated[
+        Literal["sine_polynomial", "polynomial", "bspline"], choice(SINE_POLYNOMIAL, POLYNOMIAL, BSPLINE)
+    ] = SINE_POLYNOMIAL
+    degree: Annotated[int, whole(3, 20)] | None = None  # polynomial: 6 to 20; bspline: 3 to 20
+    control_points: Annotated[int, whole(7, 100)] | None = None  # bspline: those at the ends count
+    box: Positive | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default(cls, value):
+        # Written out, so that a resolved configuration shows what the law uses.
+        own = _OF_LAW.get(value.get("kind", SINE_POLYNOMIAL), {}) if _is_plain(value) else {}
+        missing = {key: default for key, default in own.items() if value.get(key) is None}
+        return {**value, **missing} if own else value
+
+    @model_validator(mode="after")
+    def _check(self) -> Trajectory:
+        for key in ("degree", "control_points"):
+            if getattr(self, key) is not None and key not in _OF_LAW[self.kind]:
+                sentence = (
+                    f"found {getattr(self, key)}, the law '{self.kind}' has no such number, leave it out"
+                )
+                raise conflict(sentence, key)
+        if self.kind == POLYNOMIAL and self.degree < 6:
+            sentence = f"found {self.degree}, a polynomial with free numbers has a degree of at least 6"
+            raise conflict(sentence, "degree")
+        if self.kind == BSPLINE and self.control_points <= self.degree:
+            sentence = f"found {self.control_points}, more than the degree ({self.degree}) are expected"
+            raise conflict(sentence, "control_points")
+        return self
+
+    @property
+    def keeps_position(self) -> bool:
+        """Whether finite position limits hold by the law's construction."""
+        return self.kind != POLYNOMIAL
+
+
+def _is_plain(value) -> bool:
+    return isinstance(value, dict) and isinstance(value.get("kind", SINE_POLYNOMIAL), str)
 
 
 class Rollout(Section):
@@ -35,11 +84,11 @@ class Rollout(Section):
 
 
 class Optimizer(Section):
-    """The search; a swarm, gradients from several starts, or gradients from the best of a swarm."""
+    """The search: a population method, gradients from several starts, or gradients from the best of a swarm."""
 
-    kind: Annotated[Literal["qpso", "hybrid", "gradient"], choice("qpso", "hybrid", "gradient")] = "hybrid"
+    kind: Annotated[str, choice(*OPTIMIZERS)] = "hybrid"
     particles: Annotated[int, whole(2, 100_000)] = 50
-    evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # qpso: the whole budget
+    evaluations: Annotated[int, whole(1, 10**9)] = 20_000  # all but hybrid and gradient: the whole budget
     swarm_evaluations: Annotated[int, whole(1, 10**9)] = 200  # hybrid: budget of the swarm phase
     contraction: Contraction = (1.0, 0.5)  # contraction-expansion coefficient: from, to
     starts: Annotated[int, whole(1, 10_000)] = 2  # gradient: starts; hybrid: best particles refined
@@ -51,20 +100,31 @@ class Optimizer(Section):
     memory: Annotated[int, whole(1, 1000)] = 10  # lbfgs
     target: Annotated[float, number(ge=0, instead=" or null")] | None = None
     chunk: Annotated[int, whole(1, 10**6)] = 10  # iterations between two looks of the host
+    options: Annotated[dict[str, float | int | str | bool], mapping("options of the optimizer")] = {}  # noqa: RUF012
 
     @model_validator(mode="after")
     def _check(self) -> Optimizer:
-        for kind, budget in (("hybrid", "swarm_evaluations"), ("qpso", "evaluations")):
-            value = getattr(self, budget)
-            if self.kind == kind and value < self.particles:
-                sentence = (
-                    f"found {value}, at least one for each of the {self.particles} particles is expected"
-                )
-                raise conflict(sentence, budget)
+        budget = "swarm_evaluations" if self.kind == "hybrid" else "evaluations"
+        value = getattr(self, budget)
+        if self.kind != "gradient" and value < self.particles:
+            sentence = f"found {value}, at least one for each of the {self.particles} particles is expected"
+            raise conflict(sentence, budget)
         if self.kind == "hybrid" and self.starts > self.particles:
             sentence = f"found {self.starts}, at most the number of particles ({self.particles}) is expected"
             raise conflict(sentence, "starts")
+        if self.options or self.kind not in ("qpso", "hybrid", "gradient"):
+            # These know best what they take; the others need not be loaded to tell.
+            try:
+                build_phases(self.kind, self.settings())
+            except OptionError as error:
+                raise conflict(error.sentence, f"options.{error.option}") from None
+            except InputError as error:
+                raise conflict(str(error), "particles" if "particles" in str(error) else "kind") from None
         return self
+
+    def settings(self) -> Settings:
+        """The same as the registry wants it."""
+        return Settings(**{f.name: getattr(self, f.name) for f in fields(Settings)})
 
 
 Deviation = Annotated[float, number(ge=0, le=0.5)]

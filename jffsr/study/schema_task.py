@@ -78,6 +78,7 @@ class Limits(Section):
     rate: Bound | None = None
     acceleration_deg: Bound | None = None
     acceleration: Bound | None = None
+    torque: Bound | None = None  # N m or N
     base_excursion_deg: Excursion | None = None
     base_excursion: Excursion | None = None
 
@@ -101,6 +102,11 @@ class Limits(Section):
     def acceleration_si(self) -> float | tuple[float, ...] | None:
         """One for all joints, or one per joint, rad/s^2 or m/s^2; None: the robot's own."""
         return self.si("acceleration")
+
+    @property
+    def torque_si(self) -> float | tuple[float, ...] | None:
+        """One for all joints, or one per joint, N m or N; None: the robot's own."""
+        return self.torque
 
     @property
     def base_excursion_si(self) -> tuple[float, float, float] | None:

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.plan import Plan
-from jffsr.planning.result import violations
+from jffsr.planning.result import LIMIT_KINDS, violations
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
@@ -53,10 +54,16 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
                 key: {"value": float(term.value), "weighted": float(term.weighted)}
                 for key, term in verification.terms.items()
             },
+            "constraints": {
+                constraint.name: {
+                    "violation": float(verification.violations[constraint.name]),
+                    "tolerance": float(tolerance_of(constraint)),
+                }
+                for constraint in plan.problem.constraints
+            },
             "limits_violated": list(violations(plan.problem, verification.overruns, tolerances)),
             "largest_overrun_relative": {
-                kind: float(np.max(getattr(verification.overruns, kind)))
-                for kind in ("position", "rate", "acceleration", "excursion")
+                kind: float(np.max(getattr(verification.overruns, kind))) for kind in LIMIT_KINDS
             },
         },
         "sensitivity": None if plan.sensitivity is None else sensitivity_summary(plan.sensitivity),
@@ -91,6 +98,9 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"position {_number(check['position_difference_m'])} m, "
         f"momentum drift {_number(check['momentum_drift_relative'])}"
     )
+    for name, constraint in check.get("constraints", {}).items():
+        missed, allowed = _number(constraint["violation"]), _number(constraint["tolerance"])
+        lines.append(f"  constraint    {name} missed by {missed} (allowed {allowed})")
     lines += sensitivity_lines(summary.get("sensitivity"))
     lines += robust_lines(summary.get("robust"))
     crosscheck = check.get("mujoco")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from jffsr.types import Array, Scalar, Vector
 
@@ -17,17 +17,28 @@ class Trajectory(Protocol):
     def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]: ...
 
 
+class Boundary(NamedTuple):
+    """What a trajectory is asked for at one end: position, rate and acceleration, (n,) each; None is left free."""
+
+    position: Vector | None
+    rate: Vector | None
+    acceleration: Vector | None
+
+
 @runtime_checkable
 class PlannedTrajectory(Protocol):
     """A trajectory with boundary conditions that hold exactly and free numbers that a planner may choose.
 
     `duration` is a scalar, s. `free_bounds` gives lower and upper bounds (k,) of the free numbers, and
-    `with_free` a trajectory of the same boundary conditions with those numbers (k,).
+    `with_free` a trajectory of the same boundary conditions with those numbers (k,). `boundary` gives these conditions
+    at the start and at the end, for the verification.
     """
 
     duration: Array
 
     def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]: ...
+
+    def boundary(self) -> tuple[Boundary, Boundary]: ...
 
     def free_bounds(self) -> tuple[Vector, Vector]: ...
 

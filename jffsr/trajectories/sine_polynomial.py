@@ -23,6 +23,8 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.spatial.trigonometry import sine_cosine
+from jffsr.trajectories.checks import checked_duration, checked_duration_bounds
+from jffsr.trajectories.interface import Boundary
 from jffsr.types import Array, Scalar, Vector
 
 # arcsin has an infinite slope at a limit; closer than this share of the half range counts as on it.
@@ -80,15 +82,6 @@ class SinePolynomial:
                         f"{name}: {what} {x:.6g} lies {place} the position limits [{low:.6g}, {high:.6g}]; "
                         f"the sine-polynomial law needs it strictly inside"
                     )
-        if not (np.isfinite(duration) and duration > 0):
-            raise InputError(f"duration is {duration:g} s; it must be positive and finite")
-        if duration_bounds is not None:
-            shortest, longest = duration_bounds
-            if not 0 < shortest < longest < np.inf:
-                raise InputError(
-                    f"duration bounds are [{shortest:g}, {longest:g}] s; "
-                    f"they must be positive, finite and in order"
-                )
         if coefficients is not None and jnp.shape(coefficients) != (start.size, 2):
             raise InputError(
                 f"coefficients have the shape {jnp.shape(coefficients)}; ({start.size}, 2) is expected"
@@ -98,10 +91,10 @@ class SinePolynomial:
             goal=goal,
             lower=lower,
             upper=upper,
-            duration=np.array(duration, dtype=float),
+            duration=checked_duration(duration),
             coefficients=np.zeros((start.size, 2)) if coefficients is None else coefficients,
             box=np.array(box, dtype=float),
-            duration_bounds=None if duration_bounds is None else np.array(duration_bounds, dtype=float),
+            duration_bounds=checked_duration_bounds(duration_bounds),
         )
 
     def __call__(self, time: Scalar) -> tuple[Vector, Vector, Vector]:
@@ -140,6 +133,11 @@ class SinePolynomial:
             half * cosine * p_1,
             half * (cosine * p_2 - sine * p_1**2),
         )
+
+    def boundary(self) -> tuple[Boundary, Boundary]:
+        """What is asked for at both ends: the start and the goal, at rest."""
+        zero = jnp.zeros_like(jnp.asarray(self.start))
+        return Boundary(self.start, zero, zero), Boundary(self.goal, zero, zero)
 
     def free_bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds (2n,) or (2n + 1,) of the free numbers: alpha, beta, then the duration."""

@@ -19,17 +19,19 @@ _REVOLUTE = (
     ("joint angle [deg]", "joint_position"),
     ("rate [deg/s]", "joint_velocity"),
     ("acceleration [deg/s²]", "joint_acceleration"),
+    ("torque [N m]", "joint_torque"),
 )
 _PRISMATIC = (
     ("joint travel [m]", "joint_position"),
     ("rate [m/s]", "joint_velocity"),
     ("acceleration [m/s²]", "joint_acceleration"),
+    ("force [N]", "joint_torque"),
 )
 
 
 @styled
 def draw_joints(dataset: Dataset, prismatic: Sequence[bool] | None = None) -> Figure:
-    """Three stacked panels of a run's joint motion: angles in deg, rates and accelerations.
+    """Three stacked panels of a run's joint motion: angles in deg, rates and accelerations; a fourth of its torques.
 
     dataset is a run's result.nc; `prismatic` (n,) says which joints slide (none): they get three panels of
     their own, in m. Limits that the curves come near are dashed, and the panel is shaded beyond those that
@@ -42,7 +44,12 @@ def draw_joints(dataset: Dataset, prismatic: Sequence[bool] | None = None) -> Fi
         for chosen, factor, rows in ((~slides, 180 / np.pi, _REVOLUTE), (slides, 1.0, _PRISMATIC))
         if chosen.any()
     ]
-    panels = [(joints, factor, row) for joints, factor, rows in groups for row in rows]
+    panels = [
+        (joints, 1.0 if variable == "joint_torque" else factor, (label, variable))
+        for joints, factor, rows in groups
+        for label, variable in rows
+        if variable in dataset
+    ]
     figure = new_figure(0.45 + 0.05 * len(names) + 1.15 * len(panels))
     all_axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
     time, near = dataset["time"].values, False

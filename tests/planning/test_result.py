@@ -15,7 +15,7 @@ from jffsr.planning.result import ResultCode, Tolerances, explain, result_code
 from jffsr.planning.verification import Overruns, Verification
 
 TOLERANCES = Tolerances()
-INSIDE = Overruns(np.full(6, -0.5), np.full(6, -0.1), np.full(6, -0.2), np.full(3, -0.3))
+INSIDE = Overruns(np.full(6, -0.5), np.full(6, -0.1), np.full(6, -0.2), np.full(3, -0.3), np.full(6, -0.4))
 
 
 @pytest.fixture(scope="module")

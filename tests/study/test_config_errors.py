@@ -6,6 +6,8 @@ import pytest
 from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture acts by being here)
 
 from jffsr.errors import InputError
+from jffsr.optimizers.registry import GENERATIONAL, OPTIMIZERS
+from jffsr.reading.did_you_mean import listed
 from jffsr.study.config import load_config
 
 
@@ -22,8 +24,10 @@ def message(text, *overrides):
 
 RATE = "a number > 0 or a list with one per joint is expected"
 SEED = "a whole number in [0, 4294967295] is expected"
+KINDS = listed(f"'{kind}'" for kind in OPTIMIZERS)
+SWARMS = listed(f"'{kind}'" for kind in GENERATIONAL)
 TOP = (
-    "kind, name, robot, limits, task, trajectory, objective, rollout, optimizer, verification, "
+    "kind, name, robot, limits, task, trajectory, objective, constraints, rollout, robust, optimizer, verification, "
     "output, seed, precision"
 )
 
@@ -60,8 +64,27 @@ ADDED = {
     "task.angular_momentum: found [0.0, 0.0, 1.0], rollout.base_mode 'attitude_held' does not keep it, leave it out",
     "  linear_momentum: [0, 2, 0]\nrollout: {base_mode: fixed}\n": "x.yaml:7: "
     "task.linear_momentum: found [0.0, 2.0, 0.0], rollout.base_mode 'fixed' does not keep it, leave it out",
-    "optimizer: {kind: qspo}\n": "x.yaml:7: optimizer.kind: found 'qspo', "
-    "'qpso', 'hybrid' or 'gradient' is expected; did you mean 'qpso'?",
+    "optimizer: {kind: qspo}\n": f"x.yaml:7: optimizer.kind: found 'qspo', {KINDS} is expected; "
+    "did you mean 'qpso'?",
+    "optimizer:\n  kind: de\n  options:\n    strategi: rand\n": "x.yaml:10: optimizer.options.strategi: "
+    "unknown option; did you mean 'strategy'?",
+    "optimizer:\n  kind: de\n  options:\n    strategy: rnad\n": "x.yaml:10: optimizer.options.strategy: "
+    "found 'rnad', 'rand', 'pbest' or 'current_to_best' is expected; did you mean 'rand'?",
+    "optimizer: {kind: de, options: {factor: 3}}\n": "x.yaml:7: optimizer.options.factor: "
+    "found 3, a number in (0, 2) is expected",
+    "optimizer: {kind: de, options: {factor: yes}}\n": "x.yaml:7: optimizer.options.factor: "
+    "found true, a number in (0, 2) is expected",
+    "optimizer: {kind: de, options: [1]}\n": "x.yaml:7: optimizer.options: "
+    "found [1], a mapping of options of the optimizer is expected",
+    "optimizer: {kind: de, particles: 3}\n": "x.yaml:7: optimizer.particles: "
+    "3 particles are fewer than the 4 that 'de' needs",
+    "optimizer: {options: {swarm: bees}}\n": f"x.yaml:7: optimizer.options.swarm: found 'bees', {SWARMS} is expected",
+    "optimizer: {kind: gradient, options: {swarm: de}}\n": "x.yaml:7: optimizer.options.swarm: "
+    "unknown option; the options here are gradient_tolerance, value_tolerance",
+    "optimizer: {kind: ga_binary, options: {bits: 1.5}}\n": "x.yaml:7: optimizer.options.bits: "
+    "found 1.5, a whole number in [1, 30] is expected",
+    "optimizer: {kind: ga, options: {elitism: 1}}\n": "x.yaml:7: optimizer.options.elitism: "
+    "found 1, true or false is expected",
     "optimizer: {particles: 500}\n": "x.yaml:7: optimizer.swarm_evaluations: found 200, "
     "at least one for each of the 500 particles is expected",
     "optimizer: {kind: qpso, evaluations: 5}\n": "x.yaml:7: optimizer.evaluations: found 5, "
