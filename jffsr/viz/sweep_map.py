@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
+from jffsr.study.sweep.significance import ranked_cost
 from jffsr.study.sweep.table import keys_of
 from jffsr.viz.style import new_figure, styled
 from jffsr.viz.sweep_boxes import OPTIMIZER, lowest
@@ -77,13 +78,14 @@ def _cells(dataset, across, up, columns, rows, panel) -> tuple[np.ndarray, np.nd
     here = dataset["code"].values != MISSING
     if panel is not None:
         here &= dataset[OPTIMIZER].values == panel
+    cost = ranked_cost(dataset)
     medians = np.full((len(rows), len(columns)), np.nan)
     met = medians.copy()
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
             runs = here & (dataset[up].values == row) & (dataset[across].values == column)
             if runs.any():
-                medians[i, j] = np.median(dataset["cost"].values[runs])
+                medians[i, j] = np.median(cost[runs])
                 met[i, j] = np.mean(dataset["code"].values[runs] == ResultCode.ACCURACY_MET)
     return medians, met
 

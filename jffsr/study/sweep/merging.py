@@ -27,6 +27,7 @@ _UNITS = {
     "attitude_difference": ("rad", "largest difference of the base attitude to the finer re-run"),
     "position_difference": ("m", "largest difference of the base position to the finer re-run"),
     "boundary_error": ("1", "largest miss of the joint motion asked for at both ends, rad or m and s"),
+    "violation": ("1", "largest violation of a constraint in the finer re-run, 0 where all are kept"),
     "momentum_drift": ("1", "relative drift of the momentum in the finer re-run"),
 }
 _COUNTS = ("code", "evaluations", "gradient_evaluations")

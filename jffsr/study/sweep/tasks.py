@@ -11,10 +11,11 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.registry import Settings
 from jffsr.planning.fingerprint import fingerprint
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances
+from jffsr.planning.search import search_of
 from jffsr.study.building import build_problem, build_settings, build_tolerances
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.sweep.points import Point
@@ -140,7 +141,7 @@ class _Builder:
 
 
 def _shared(setting: Setting, shape: Any) -> Any:
-    phases = build_phases(setting.optimizer, setting.settings)
+    phases, _ = search_of(setting.problem, setting.optimizer, setting.settings)
     lengths = tuple(float(phase.stop.iterations) for phase in phases)
     if setting.precision != "float64" or not all(map(math.isfinite, lengths)):
         return None
