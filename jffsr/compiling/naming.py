@@ -25,7 +25,7 @@ from jax.sharding import Mesh
 import jffsr
 
 # Types and functions of these are told by their names: the package's text and the versions stand in the digest.
-_TRUSTED = ("jffsr", "jax", "jaxlib", "numpy", "optax", "chex", "builtins")
+_TRUSTED = ("jffsr", "jax", "jaxlib", "numpy", "optax", "chex", "evosax", "builtins")
 
 
 class Unnamed(Exception):

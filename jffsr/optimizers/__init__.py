@@ -1,1 +1,1 @@
-"""One interface, one driver, and the optimizers: QPSO, gradients, and the two in a row."""
+"""One interface, one driver, and the optimizers: swarms, evolution, gradients, and these combined."""

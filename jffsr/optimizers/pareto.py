@@ -154,13 +154,12 @@ def _values(problem: MultiObjectiveProblem, positions: Array) -> Array:
 
 def _evolved(problem: MultiObjectiveProblem, evaluations: int, population: int, seed: int):
     """Positions (K, d) and values (K, m) of the last population, and how many evaluations were spent."""
-    nsga2, wrap = _library()
+    start, tell = _library()
     lower, upper = (np.asarray(bound, dtype=float) for bound in problem.bounds())
     shape = jax.eval_shape(problem.values, jnp.asarray(lower)).shape
     if len(shape) != 1 or shape[0] < 2:
         raise InputError(f"the objectives are of shape {shape}; two numbers or more are expected")
-    told = wrap(lower, upper, shape[0])
-    algorithm = nsga2(population, shape[0], told, seed)
+    algorithm = start(lower, upper, shape[0], population, seed)
     spent = 0
     while spent < evaluations:
         asked = algorithm.ask()
@@ -173,33 +172,35 @@ def _evolved(problem: MultiObjectiveProblem, evaluations: int, population: int, 
         with all_devices():
             found = np.asarray(_values(problem, padded))[: len(positions)]
         finite = np.all(np.isfinite(found), axis=1, keepdims=True)
-        asked.set("F", np.where(finite, found, _WORST))
-        asked.apply(lambda one: one.evaluated.update(["F", "G", "H"]))
-        algorithm.tell(infills=asked)
+        tell(algorithm, asked, np.where(finite, found, _WORST))
         spent += len(positions)
     found = algorithm.pop
     return found.get("X"), found.get("F"), spent
 
 
 def _library():
-    """pymoo's NSGA-II made ready, and its problem; the library is asked for only here."""
+    """Two functions on pymoo: one makes its NSGA-II ready, one tells it objectives; imported only here."""
     try:
         from pymoo.algorithms.moo.nsga2 import NSGA2, RankAndCrowding
+        from pymoo.core.evaluator import Evaluator
         from pymoo.core.problem import Problem
+        from pymoo.problems.static import StaticProblem
     except ImportError:
         raise InputError("a Pareto set needs pymoo: pip install 'jffsr[pareto]'") from None
 
-    def nsga2(population: int, objectives: int, problem, seed: int):
+    def start(lower: np.ndarray, upper: np.ndarray, objectives: int, population: int, seed: int):
         # Beyond two objectives the crowding of neighbours says more than that of sides.
         survival = RankAndCrowding(crowding_func="cd" if objectives == 2 else "mnn")
         algorithm = NSGA2(pop_size=population, survival=survival)
+        problem = Problem(n_var=lower.size, n_obj=objectives, xl=lower, xu=upper)
         algorithm.setup(problem, seed=seed, termination=("n_gen", 10**9), verbose=False)
         return algorithm
 
-    def wrap(lower: np.ndarray, upper: np.ndarray, objectives: int):
-        return Problem(n_var=lower.size, n_obj=objectives, xl=lower, xu=upper)
+    def tell(algorithm, asked, values: np.ndarray) -> None:
+        Evaluator().eval(StaticProblem(algorithm.problem, F=values), asked)
+        algorithm.tell(infills=asked)
 
-    return nsga2, wrap
+    return start, tell
 
 
 def _not_dominated(values: np.ndarray) -> np.ndarray:

@@ -38,8 +38,8 @@ class Problem:
     initial_state gives the base pose at the start (the joints are the trajectory's); momentum (6,) is P, then
     L about the system centre of mass, in I; num_steps, static, is the number of Runge-Kutta steps; base_mode
     and kernel, static, are those of `jffsr.rollout`. With an uncertainty the index is measured over its robots; motion
-    and terms remain those of `robot`. All else is traced: problems of one robot with other numbers share their compiled
-    programs.
+    and terms remain those of `robot`. Constraints, none by default, must have different names. All else is traced:
+    problems of one robot with other numbers share their compiled programs.
     """
 
     robot: Robot

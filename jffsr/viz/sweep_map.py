@@ -10,9 +10,10 @@ from matplotlib.figure import Figure
 
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
+from jffsr.study.sweep.significance import ranked_cost
 from jffsr.study.sweep.table import keys_of
 from jffsr.viz.style import new_figure, styled
-from jffsr.viz.sweep_boxes import OPTIMIZER
+from jffsr.viz.sweep_boxes import OPTIMIZER, lowest
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -27,7 +28,7 @@ def draw_map(dataset: Dataset) -> Figure | None:
     """Median J over the first two swept keys of at least two values, a panel for each optimizer.
 
     Each cell, where there is room, says the share of runs that met the accuracy. Medians are over everything else that
-    was swept. None where there are no two such keys.
+    was swept; the colours end four decades under the accuracy. None where there are no two such keys.
     """
     keys = [
         key for key in keys_of(dataset) if key != OPTIMIZER and 2 <= len(_levels(dataset, key)) <= MOST_LEVELS
@@ -41,7 +42,8 @@ def draw_map(dataset: Dataset) -> Figure | None:
     known = np.concatenate([cells[np.isfinite(cells) & (cells > 0)] for cells in medians])
     if not known.size:
         return None
-    norm = LogNorm(known.min(), max(known.max(), 1.001 * known.min()))
+    floor = max(known.min(), lowest(dataset))
+    norm = LogNorm(floor, max(known.max(), 10 * floor), clip=True)
     wide = max(1.2, min(0.34 * len(columns), 2.6))
     figure = new_figure(max(1.9, min(0.24 * len(rows) + 1.0, 4.0)), wide * len(panels) + 1.5)
     all_axes = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
@@ -58,7 +60,9 @@ def draw_map(dataset: Dataset) -> Figure | None:
         if len(columns) <= _WRITTEN:
             _write_shares(axes, cells, share, norm)
     all_axes[0].set_ylabel(up)
-    figure.colorbar(image, ax=all_axes, label="median J [-]")
+    figure.colorbar(
+        image, ax=all_axes, label="median J [-]", extend="min" if known.min() < floor else "neither"
+    )
     return figure
 
 
@@ -74,13 +78,14 @@ def _cells(dataset, across, up, columns, rows, panel) -> tuple[np.ndarray, np.nd
     here = dataset["code"].values != MISSING
     if panel is not None:
         here &= dataset[OPTIMIZER].values == panel
+    cost = ranked_cost(dataset)
     medians = np.full((len(rows), len(columns)), np.nan)
     met = medians.copy()
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
             runs = here & (dataset[up].values == row) & (dataset[across].values == column)
             if runs.any():
-                medians[i, j] = np.median(dataset["cost"].values[runs])
+                medians[i, j] = np.median(cost[runs])
                 met[i, j] = np.mean(dataset["code"].values[runs] == ResultCode.ACCURACY_MET)
     return medians, met
 

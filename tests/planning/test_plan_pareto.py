@@ -30,7 +30,7 @@ def test_turn_of_the_base_against_overrun_rates(problem):
     assert found.hypervolume >= found.hypervolume_before > 0
     assert np.all(np.diff(found.values[:, 0]) > 0)
     assert np.all(np.diff(found.values[:, 1]) < 0)
-    terms = jax.vmap(problem.terms)(found.points)
+    terms = jax.jit(jax.vmap(problem.terms))(found.points)
     np.testing.assert_allclose(found.values[:, 0], terms["attitude_change"].weighted, rtol=1e-9, atol=1e-9)
     both = sum(terms[name].weighted for name in RATES)
     np.testing.assert_allclose(found.values[:, 1], both, rtol=1e-9, atol=1e-9)

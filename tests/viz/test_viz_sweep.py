@@ -10,6 +10,7 @@ import xarray
 from scipy import stats
 
 from jffsr import cli
+from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.significance import compare, holm
 from jffsr.study.sweep.table import keys_of, markdown, rows_of
@@ -106,6 +107,15 @@ def test_equal_and_infinite_costs_are_ranked(dataset):
     assert {pair.p for pair in comparison.pairs} == {1.0}
     assert {pair.lower for pair in comparison.pairs} == {0.5}
     assert comparison.friedman is None
+
+
+def test_a_cost_bought_by_breaking_a_constraint_is_the_worst(dataset):
+    changed = dataset.copy(deep=True)
+    changed["cost"].values[0] = 1e-3
+    changed["code"].values[0] = ResultCode.CONSTRAINTS_VIOLATED
+    assert rows_of(changed)[0].cost[0] == np.inf
+    pair, before = (compare(data, keys_of(data))[0].pairs[0] for data in (changed, dataset))
+    assert pair.lower == before.lower == 0.0
 
 
 def test_boxes_stand_at_the_runs(dataset):

@@ -8,12 +8,15 @@ from typing import Any
 import jax
 import numpy as np
 
+from jffsr.optimizers.constraints import split
 from jffsr.planning.many import PlanHistory, Plans, plan_many
 from jffsr.planning.plan import Plan, solve
 from jffsr.study.sweep.tasks import Task
 
 STEPS_KEPT = 200
 """Steps of each search that are kept, spread evenly over it, its last one among them."""
+OVERRUN = "overrun_"
+"""What the names of the limits' overruns begin with."""
 
 Results = dict[str, np.ndarray]
 
@@ -77,6 +80,9 @@ def _results(plans: Plans) -> Results:
     check, history = plans.verification, plans.history
     names = sorted(check.terms)
     kept = _kept(history.best_value.shape[1])
+    # Under constraints the search compares merits; a value counts from where all constraints are kept.
+    best = split(history.best_value)[0] if check.violations else history.best_value
+    missed = [np.asarray(values) for values in check.violations.values()]
     return {
         "code": plans.result,
         "cost": plans.cost,
@@ -89,14 +95,15 @@ def _results(plans: Plans) -> Results:
         "position_difference": check.position_difference,
         "boundary_error": check.boundary_error,
         "momentum_drift": check.momentum_drift,
+        "violation": np.max(missed, axis=0) if missed else np.zeros(len(plans.cost)),
         **{
-            f"overrun_{kind}": np.max(getattr(check.overruns, kind), axis=-1)
-            for kind in ("position", "rate", "acceleration", "excursion")
+            f"{OVERRUN}{kind}": np.max(values, axis=-1, initial=-np.inf)
+            for kind, values in vars(check.overruns).items()
         },
         "terms": np.array(names),
         "term_value": np.stack([check.terms[name].value for name in names], axis=-1),
         "term_weighted": np.stack([check.terms[name].weighted for name in names], axis=-1),
-        "history_best_value": history.best_value[:, kept],
+        "history_best_value": best[:, kept],
         "history_evaluations": history.evaluations[:, kept],
         "history_gradient_evaluations": history.gradient_evaluations[:, kept],
     }

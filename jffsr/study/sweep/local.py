@@ -30,11 +30,11 @@ def run_here(
 ) -> Iterator[Outcome]:
     """The tasks of several points one after another on all devices of this process, then the others by workers."""
     for task in tasks:
-        if len(task.numbers) > 1 and task.width is not None:
+        if not task.queued:
             if interrupted():
                 return
             yield task, *attempt(task)
-    queued = [task for task in tasks if len(task.numbers) == 1 or task.width is None]
+    queued = [task for task in tasks if task.queued]
     if queued and not interrupted():
         count = workers or min(MOST_WORKERS, available_cores())
         yield from _by_workers(queued, min(count, len(queued)), interrupted)

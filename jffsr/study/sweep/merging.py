@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jffsr.study.dataset import save_dataset
+from jffsr.study.sweep.compute import OVERRUN
 from jffsr.study.sweep.parts import Part
 from jffsr.study.sweep.points import Point, value_text
 
@@ -26,11 +27,8 @@ _UNITS = {
     "attitude_difference": ("rad", "largest difference of the base attitude to the finer re-run"),
     "position_difference": ("m", "largest difference of the base position to the finer re-run"),
     "boundary_error": ("1", "largest miss of the joint motion asked for at both ends, rad or m and s"),
+    "violation": ("1", "largest violation of a constraint in the finer re-run, 0 where all are kept"),
     "momentum_drift": ("1", "relative drift of the momentum in the finer re-run"),
-    "overrun_position": ("1", "largest overrun of a joint position limit, relative to half its range"),
-    "overrun_rate": ("1", "largest relative overrun of a joint rate limit"),
-    "overrun_acceleration": ("1", "largest relative overrun of a joint acceleration limit"),
-    "overrun_excursion": ("1", "largest relative overrun of a base excursion limit"),
 }
 _COUNTS = ("code", "evaluations", "gradient_evaluations")
 _HISTORY = {
@@ -53,11 +51,15 @@ def merged(points: Sequence[Point], parts: Sequence[Part], name: str, accuracy: 
 
     count = len(points)
     variables: dict[str, Any] = {}
-    for quantity, (unit, meaning) in _UNITS.items():
+    overruns = dict.fromkeys(name for part in parts for name in part.results if name.startswith(OVERRUN))
+    for name in overruns:
+        overruns[name] = ("1", f"largest relative overrun of a limit: {name.removeprefix(OVERRUN)}")
+    for quantity, (unit, meaning) in {**_UNITS, **overruns}.items():
         blank = MISSING if quantity == "code" else 0 if quantity in _COUNTS else np.nan
         values = np.full(count, blank, dtype=np.int64 if quantity in _COUNTS else float)
         for part in parts:
-            values[list(part.numbers)] = part.results[quantity]
+            if quantity in part.results:
+                values[list(part.numbers)] = part.results[quantity]
         variables[quantity] = ("point", values, {"units": unit, "long_name": meaning})
     variables["free_numbers"] = (
         ("point", "free"),

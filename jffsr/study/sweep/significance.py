@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
 
 MOST_CHOICES = 12
@@ -83,7 +84,7 @@ def compare(dataset: Any, keys: list[str]) -> list[Comparison]:
 
 def _comparison(dataset: Any, key: str, levels: list[Any], others: list[str]) -> Comparison | None:
     known = dataset["code"].values != MISSING
-    cost = np.where(np.isnan(dataset["cost"].values), np.inf, dataset["cost"].values)
+    cost = ranked_cost(dataset)
     columns = [dataset[other].values for other in others]
     settings = list(dict.fromkeys(zip(*(column.tolist() for column in columns), strict=True))) or [()]
     pairs, medians = [], []
@@ -117,6 +118,12 @@ def _pair(setting: dict[str, Any], one: Any, other: Any, first: np.ndarray, seco
         p = float(mannwhitneyu(a, b, alternative="two-sided").pvalue)
     below = np.mean((a[:, None] < b) + 0.5 * (a[:, None] == b))
     return Pair(setting, one, other, (float(np.median(first)), float(np.median(second))), float(below), p)
+
+
+def ranked_cost(dataset: Any) -> np.ndarray:
+    """J of every point, infinite where it is not finite or was bought by breaking a constraint."""
+    cost, code = dataset["cost"].values, dataset["code"].values
+    return np.where(np.isnan(cost) | (code == ResultCode.CONSTRAINTS_VIOLATED), np.inf, cost)
 
 
 def holm(probabilities: list[float]) -> list[float]:

@@ -11,14 +11,14 @@ import numpy as np
 
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
-from jffsr.study.sweep.significance import Comparison
+from jffsr.study.sweep.significance import Comparison, ranked_cost
 
 MOST_PRINTED = 40
 
 
 @dataclass(frozen=True)
 class Row:
-    """A setting: its values, its points, and their codes, costs and evaluations (computed points alone)."""
+    """A setting: its values, its points, and their codes, ranked costs and evaluations (computed points alone)."""
 
     values: dict[str, Any]
     points: np.ndarray
@@ -37,6 +37,7 @@ def rows_of(dataset: Any, keys: Sequence[str] | None = None) -> list[Row]:
     """A row for each combination of the keys' values (all but the seed), in the order of the points."""
     keys = keys_of(dataset) if keys is None else list(keys)
     columns = [dataset[key].values.tolist() for key in keys]
+    cost = ranked_cost(dataset)
     groups: dict[tuple, list[int]] = {}
     for point in range(dataset.sizes["point"]):
         groups.setdefault(tuple(column[point] for column in columns), []).append(point)
@@ -44,10 +45,11 @@ def rows_of(dataset: Any, keys: Sequence[str] | None = None) -> list[Row]:
     for values, members in groups.items():
         points = np.array(members)
         points = points[dataset["code"].values[points] != MISSING]
-        arrays = [
-            dataset[name].values[points] for name in ("code", "cost", "evaluations", "gradient_evaluations")
-        ]
-        rows.append(Row(dict(zip(keys, values, strict=True)), points, *arrays))
+        code, evaluations, gradients = (
+            dataset[name].values[points] for name in ("code", "evaluations", "gradient_evaluations")
+        )
+        named = dict(zip(keys, values, strict=True))
+        rows.append(Row(named, points, code, cost[points], evaluations, gradients))
     return rows
 
 

@@ -11,10 +11,11 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
-from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.optimizers.registry import Settings
 from jffsr.planning.fingerprint import fingerprint
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances
+from jffsr.planning.search import search_of
 from jffsr.study.building import build_problem, build_settings, build_tolerances
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.sweep.points import Point
@@ -57,6 +58,11 @@ class Task:
         )
 
     @property
+    def queued(self) -> bool:
+        """Whether a worker process computes it, beside others, and not all devices of this one together."""
+        return self.width is None or self.width == 1
+
+    @property
     def title(self) -> str:
         """For messages."""
         if len(self.numbers) == 1:
@@ -94,7 +100,7 @@ def sort_into_tasks(points: Sequence[Point], together: int | None = None) -> lis
         width = math.ceil(len(members) / parts)
         for start in range(0, len(members), width):
             tasks.append(_task(members[start : start + width], None if alone else width))
-    return sorted(tasks, key=lambda task: (len(task.numbers) == 1, task.numbers[0]))
+    return sorted(tasks, key=lambda task: (task.queued, task.numbers[0]))
 
 
 def _task(members: list[tuple[Point, Setting]], width: int | None) -> Task:
@@ -135,7 +141,7 @@ class _Builder:
 
 
 def _shared(setting: Setting, shape: Any) -> Any:
-    phases = build_phases(setting.optimizer, setting.settings)
+    phases, _ = search_of(setting.problem, setting.optimizer, setting.settings)
     lengths = tuple(float(phase.stop.iterations) for phase in phases)
     if setting.precision != "float64" or not all(map(math.isfinite, lengths)):
         return None
