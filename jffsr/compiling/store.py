@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import pickle
+import secrets
 import threading
 import zlib
 from collections.abc import Callable
@@ -26,7 +27,7 @@ from jffsr.compiling.naming import Unnamed, digest
 
 _logger = logging.getLogger(__name__)
 _SUFFIX = ".program"
-_INERT = {"xla_gpu_nccl_termination_timeout_seconds": -2}
+_INERT = "xla_gpu_nccl_termination_timeout_seconds"
 _folder: Path | None = None
 _loaded_by_jax = threading.local()
 
@@ -78,8 +79,11 @@ def compile_and_save(name: str, lowered: jax.stages.Lowered, options: dict) -> C
     executable = lowered.compile()
     if _loaded_by_jax.flag:
         # What JAX's own cache has loaded cannot be written out again: XLA keeps its object code no longer. An
-        # option that means nothing here, and that no one else sets, makes JAX compile.
-        executable = lowered.compile(compiler_options={**options, **_INERT})
+        # option that means nothing here, of a value that no one has set before, makes JAX compile.
+        _loaded_by_jax.flag = False
+        executable = lowered.compile(compiler_options={**options, _INERT: -2 - secrets.randbelow(2**30)})
+        if _loaded_by_jax.flag:
+            return executable
     try:
         parts = ("lapack" in lowered.as_text(), *serialize_executable.serialize(executable))
         _write(_path(name), zlib.compress(pickle.dumps(parts), level=1))
