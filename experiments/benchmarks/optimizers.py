@@ -83,9 +83,9 @@ def measured(quick: bool, only: str = ""):
         for name in (name for name in OURS if only in name):
             programs = {"jffsr": ours(name, members, dimensions, generations, runs)}
             lengths = {"jffsr": generations}
-            if name in EVOSAX and find_spec("evosax"):
-                # Its differential evolution sorts the population once for each member.
-                few = name == "DE rand/1" and members > 1000
+            # Its differential evolution sorts the population once for each member, which takes seconds.
+            few = name == "DE rand/1" and members > 1000
+            if name in EVOSAX and find_spec("evosax") and not (few and quick):
                 lengths["evosax"] = 2 if few else generations
                 programs["evosax"] = evosax(EVOSAX[name], members, dimensions, lengths["evosax"], runs)
             if name in PYGMO and find_spec("pygmo"):
