@@ -41,12 +41,18 @@ EVOSAX = {
     "CMA-ES": "CMA_ES",
 }
 PYGMO = {
-    "PSO": lambda pg, n: pg.pso(gen=n, variant=5, neighb_type=1, max_vel=0.5, memory=False),
-    "DE rand/1": lambda pg, n: pg.de(gen=n, F=0.5, CR=0.9, variant=7, ftol=0.0, xtol=0.0),
-    "GA, real": lambda pg, n: pg.sga(
-        gen=n, cr=0.9, eta_c=10.0, m=0.05, param_m=20.0, crossover="sbx", mutation="polynomial"
+    "PSO": lambda pg, n, even: pg.pso(gen=n, variant=5, neighb_type=1, max_vel=0.5, memory=False),
+    "DE rand/1": lambda pg, n, even: pg.de(gen=n, F=0.5, CR=0.9, variant=7, ftol=0.0, xtol=0.0),
+    "GA, real": lambda pg, n, even: pg.sga(
+        gen=n,
+        cr=0.9,
+        eta_c=10.0,
+        m=0.05,
+        param_m=20.0,
+        crossover="sbx" if even else "exponential",
+        mutation="polynomial",
     ),
-    "CMA-ES": lambda pg, n: pg.cmaes(gen=n, ftol=0.0, xtol=0.0, memory=False, force_bounds=True),
+    "CMA-ES": lambda pg, n, even: pg.cmaes(gen=n, ftol=0.0, xtol=0.0, memory=False, force_bounds=True),
 }
 SIZES = ((256, 12), (256, 28), (4096, 12), (4096, 28))
 SMALL, MANY = 25, 64
@@ -83,9 +89,9 @@ def measured(quick: bool, only: str = ""):
         for name in (name for name in OURS if only in name):
             programs = {"jffsr": ours(name, members, dimensions, generations, runs)}
             lengths = {"jffsr": generations}
-            if name in EVOSAX and find_spec("evosax"):
-                # Its differential evolution sorts the population once for each member.
-                few = name == "DE rand/1" and members > 1000
+            # Its differential evolution sorts the population once for each member, which takes seconds.
+            few = name == "DE rand/1" and members > 1000
+            if name in EVOSAX and find_spec("evosax") and not (few and quick):
                 lengths["evosax"] = 2 if few else generations
                 programs["evosax"] = evosax(EVOSAX[name], members, dimensions, lengths["evosax"], runs)
             if name in PYGMO and find_spec("pygmo"):
@@ -152,7 +158,7 @@ def pygmo(make: Callable, members: int, dimensions: int, generations: int, runs:
     """An algorithm of pygmo in C++ on its own Rosenbrock function, one run after another."""
     import pygmo as pg
 
-    algorithm = pg.algorithm(make(pg, generations))
+    algorithm = pg.algorithm(make(pg, generations, members % 2 == 0))
     population = pg.population(pg.rosenbrock(dimensions), members, seed=1)
 
     def search():

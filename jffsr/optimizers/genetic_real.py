@@ -64,9 +64,13 @@ class RealGA(PopulationOptimizer):
         first, second = self.cross(spread, one, two)
         children = jnp.concatenate([jnp.where(mated, first, one), jnp.where(mated, second, two)])
         children = children[: self.particles]
-        rate, size_ = uniforms(mutate, (2, *children.shape))
-        moved = children + width * polynomial(size_, self.mutation_index)
-        children = jnp.where(rate * children.shape[1] < self.mutations, moved, children)
+        # Random numbers are most of the cost: one that falls below the rate is, over the rate, uniform again.
+        draw, rate = uniforms(mutate, children.shape), jnp.minimum(self.mutations / children.shape[1], 1.0)
+        mutated = draw < rate
+        change = polynomial(
+            jnp.where(mutated, draw / jnp.where(rate > 0, rate, 1.0), 0.5), self.mutation_index
+        )
+        children = jnp.where(mutated, children + width * change, children)
         return jnp.clip(children, lower, upper), state.own
 
     def cross(self, key: Array, one: Array, two: Array) -> tuple[Array, Array]:
@@ -75,10 +79,13 @@ class RealGA(PopulationOptimizer):
             low, length = jnp.minimum(one, two), jnp.abs(one - two)
             places = uniforms(key, (2, *one.shape)) * (1 + 2 * self.blend_margin) - self.blend_margin
             return low + places[0] * length, low + places[1] * length
-        draws, swap = uniforms(key, (2, *one.shape))
-        middle, half = (one + two) / 2, spread_factor(draws, self.crossover_index) * (two - one) / 2
-        # Half of the numbers change sides, so that a child is not near the same parent in all of them.
-        half = jnp.where(swap < 0.5, half, -half)
+        # Half of the numbers change sides, so that a child is not near the same parent in all of them. The first
+        # digit of a draw says which, the others are a draw again.
+        draws = 2 * uniforms(key, one.shape)
+        swap = draws >= 1
+        factor = spread_factor(draws - swap, self.crossover_index)
+        middle, half = (one + two) / 2, factor * (two - one) / 2
+        half = jnp.where(swap, -half, half)
         return middle - half, middle + half
 
 

@@ -29,8 +29,8 @@ CASES = [
     ("de", {"strategy": "pbest"}, sphere, 1e-15),  # 5e-32
     ("ssade", {}, sphere, 1e-15),  # 2e-28
     ("ssade", {}, rastrigin, 4.0),  # 0.5
-    ("ga", {}, sphere, 1e-2),  # 1.3e-3
-    ("ga", {}, rastrigin, 5.0),  # 1.7
+    ("ga", {}, sphere, 1e-2),  # 1.0e-3
+    ("ga", {}, rastrigin, 5.0),  # 1.6
     ("ga_binary", {}, sphere, 1.0),  # 0.19
     ("evosax", {"strategy": "SNES"}, sphere, 1e-15),  # 9e-22
     ("evosax", {"strategy": "Sep_CMA_ES"}, sphere, 1e-15),  # 4e-30

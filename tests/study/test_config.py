@@ -214,3 +214,13 @@ def test_importing_the_configuration_imports_no_heavy_package():
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_options_of_the_optimizer_come_back_as_they_were():
+    given = "optimizer:\n  kind: hybrid\n  options: {swarm: pso, rule: success, inertia_end: 0.3}\n"
+    config = load(GOOD + given)
+    assert config.optimizer.options == {"swarm": "pso", "rule": "success", "inertia_end": 0.3}
+    assert load(dump_config(config)) == config
+    assert load(GOOD, "optimizer.kind=de", "optimizer.options.strategy=pbest").optimizer.options == {
+        "strategy": "pbest"
+    }
