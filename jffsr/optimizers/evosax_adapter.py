@@ -8,6 +8,7 @@ what leaves the cube is reflected back into it, so that inside nothing is bent.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.util import find_spec
@@ -99,10 +100,16 @@ class Evosax(PopulationOptimizer):
 def _made(name: str, particles: int, dimensions: int, x64: bool) -> tuple[Any, Any]:
     import evosax.algorithms
 
-    # Outside of whatever is being traced, so that it can be kept.
-    with jax.ensure_compile_time_eval(), jax.enable_x64(x64):
-        strategy = getattr(evosax.algorithms, name)(population_size=particles, solution=jnp.zeros(dimensions))
-        return strategy, strategy.default_params
+    def make() -> tuple[Any, Any]:
+        with jax.enable_x64(x64):
+            cls = getattr(evosax.algorithms, name)
+            strategy = cls(population_size=particles, solution=jnp.zeros(dimensions))
+            return strategy, strategy.default_params
+
+    # Outside of whatever is being traced, so that it can be kept, and of a mesh that a batch is spread over: both are
+    # matters of the thread.
+    with ThreadPoolExecutor(1) as outside:
+        return outside.submit(make).result()
 
 
 def _reflected(problem: OptimizationProblem, free: Array) -> Array:

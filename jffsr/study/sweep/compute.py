@@ -26,7 +26,7 @@ def run_task(task: Task) -> Results:
     if task.width is None:
         with jax.enable_x64(task.settings[0].precision == "float64"):
             plans = _alone(task)
-        return _results(plans)
+        return _results(plans, task.settings[0].precision)
     with jax.enable_x64(True):
         # A task of which something is done already is filled up, so that it is the same program.
         settings, seeds = (_filled(values, task.width) for values in (task.settings, task.seeds))
@@ -76,12 +76,12 @@ def _alone(task: Task) -> Plans:
     return jax.tree.map(lambda leaf: np.asarray(leaf)[None], plans)
 
 
-def _results(plans: Plans) -> Results:
+def _results(plans: Plans, precision: str = "float64") -> Results:
     check, history = plans.verification, plans.history
     names = sorted(check.terms)
     kept = _kept(history.best_value.shape[1])
     # Under constraints the search compares merits; a value counts from where all constraints are kept.
-    best = split(history.best_value)[0] if check.violations else history.best_value
+    best = split(history.best_value, precision)[0] if check.violations else history.best_value
     missed = [np.asarray(values) for values in check.violations.values()]
     return {
         "code": plans.result,

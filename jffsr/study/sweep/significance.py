@@ -123,7 +123,11 @@ def _pair(setting: dict[str, Any], one: Any, other: Any, first: np.ndarray, seco
 def ranked_cost(dataset: Any) -> np.ndarray:
     """J of every point, infinite where it is not finite or was bought by breaking a constraint."""
     cost, code = dataset["cost"].values, dataset["code"].values
-    return np.where(np.isnan(cost) | (code == ResultCode.CONSTRAINTS_VIOLATED), np.inf, cost)
+    bad = np.isnan(cost) | (code == ResultCode.CONSTRAINTS_VIOLATED)
+    if dataset.sizes.get("step"):
+        # A search that met no point with every constraint kept has no value, whatever else the verdict says.
+        bad |= ~np.isfinite(dataset["history_best_value"].values).any(axis=1)
+    return np.where(bad, np.inf, cost)
 
 
 def holm(probabilities: list[float]) -> list[float]:
