@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -35,6 +35,12 @@ demo: $(STAMP)  ## run one scenario (CONFIG=...)
 	$(VENV)/bin/jffsr run $(CONFIG)
 
 test: $(STAMP)  ## run the tests (WORKERS=2, PYTEST_ARGS='-k name')
+	$(PYTEST) $(PYTEST_ARGS)
+
+# Heavier checks compute for longer than they compile: the code generator's optimisations are worth their time.
+check-%: export JFFSR_TESTS_OPTIMISED = 1
+
+check-optimised: $(STAMP)  ## run the tests with the compiler's optimisations, which `make test` leaves out
 	$(PYTEST) $(PYTEST_ARGS)
 
 check-slow: $(STAMP)  ## run the heavier checks
@@ -68,7 +74,7 @@ bench-optimizers:  ## time a generation of each optimizer against evosax and pyg
 check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
 	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)
 
-check-sweep: $(STAMP)  ## check that a sweep of 200 runs survives 20 kills
+check-sweep: $(STAMP)  ## check that a sweep of 200 runs survives 20 kills, and others theirs
 	$(VENV_PYTHON) -m pytest -m sweep $(PYTEST_ARGS)
 
 check-cluster: $(STAMP)  ## check that a sweep on a dask cluster survives the loss of a worker

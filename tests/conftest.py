@@ -14,8 +14,11 @@ jax.config.update("jax_enable_x64", True)
 
 from jffsr.compiling import OPTIONS  # noqa: E402
 
-# The tests' own programs get the options of the package's: they have to stand here before the first computation.
-for option, value in OPTIONS.items():
+# The tests' own programs get the options of the package's: they have to stand here before the first computation. The
+# suite compiles for longer than it computes, so that it leaves out the code generator's optimisations; the heavier
+# checks, and the whole suite under `make check-optimised`, have them.
+LEVEL = {} if os.environ.get("JFFSR_TESTS_OPTIMISED") else {"xla_backend_optimization_level": 0}
+for option, value in {**OPTIONS, **LEVEL}.items():
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} --{option}={str(value).lower()}".strip()
 
 from motions import robot_from_record  # noqa: E402

@@ -117,6 +117,7 @@ def test_bounds_that_make_no_robot_are_refused(problem, keywords):
         CoDesign.within(problem, **keywords)
 
 
+@pytest.mark.slow
 def test_longer_arms_serve_a_task_that_the_robot_alone_does_not_meet(problem):
     """The index to be met is the base's turn: it falls where lengths and mount are free too."""
     settings = Settings(particles=20, evaluations=1000)

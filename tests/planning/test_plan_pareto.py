@@ -23,6 +23,7 @@ def problem(robots):
     return planar(limited(robots["hu_2011_planar2"]), 18.0, excursion_limit=None)
 
 
+@pytest.mark.slow
 def test_turn_of_the_base_against_overrun_rates(problem):
     found = plan_pareto(problem, ["attitude_change", RATES], 80, population=8, polish_iterations=24)
     assert len(found.points) >= 2

@@ -64,6 +64,7 @@ def test_the_spread_over_robots_is_that_of_each(problem, both):
     np.testing.assert_allclose(np.mean(spread), both(uncertain, FREE)[1], rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_plan_for_the_worst_case_is_less_bad_in_the_worst_case(problem):
     """Searched alike; certain robots are as many copies of the nominal one, so that both are one program."""
     settings = Settings(particles=16, evaluations=640)

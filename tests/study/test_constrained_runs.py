@@ -142,6 +142,7 @@ def test_two_constraints_of_one_name_are_refused(config):
         search_of(problem, "hybrid", Settings())
 
 
+@pytest.mark.slow
 def test_a_batch_is_planned_under_its_own_constraints(config):
     """Three final attitudes of one task in one program; the last cannot be reached."""
     problem = build_problem(config)

@@ -27,6 +27,7 @@ def deadly(robot, motion):
 """
 
 
+@pytest.mark.sweep
 def test_one_that_dies_takes_no_other_with_it_and_is_tried_again(tmp_path, monkeypatch, capsys):
     base = write_base(tmp_path)
     (tmp_path / "own_terms.py").write_text(TERMS)
