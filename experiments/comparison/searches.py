@@ -54,9 +54,9 @@ class Search:
 
 SEARCHES = (
     Search("QPSO", "qpso"),
-    Search("QPSO, weighted mean", "qpso", {"mean": "weighted"}),
-    Search("PSO, constriction", "pso"),
-    Search("PSO, adaptive inertia", "pso", {"inertia": "adaptive"}),
+    Search("QPSO, weighted mean", "qpso", {"mean_best": "weighted"}),
+    Search("PSO, constriction", "pso", {"rule": "constriction"}),
+    Search("PSO, adaptive inertia", "pso", {"rule": "success"}),
     Search("GA, binary", "ga_binary"),
     Search("GA, real", "ga"),
     Search("DE/rand/1", "de", {"strategy": "rand"}),
