@@ -92,7 +92,8 @@ class CoDesign:
     def split(self, candidate: Vector) -> tuple[Problem, Vector]:
         """The problem with the candidate's robot, and the plan's own free numbers."""
         n, k = self.problem.robot.num_joints, len(mounted_joints(self.problem.robot))
-        free, length, mount = jnp.split(candidate, [-(n + 3 * k), -3 * k])
+        lengths = candidate.shape[0] - n - 3 * k
+        free, length, mount = jnp.split(candidate, [lengths, lengths + n])
         design = Design(length, mount.reshape(k, 3))
         return _designed(self.problem, design, self.mass_exponent), free
 

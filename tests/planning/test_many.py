@@ -29,7 +29,10 @@ def problems(robots):
 
 @pytest.fixture(scope="module")
 def plans(problems):
-    return plan_in_chunks(problems, seed=3)
+    many._plan_chunk.clear_cache()
+    found = plan_in_chunks(problems, seed=3)
+    assert many._plan_chunk._cache_size() == 1
+    return found
 
 
 def test_a_batch_is_planned_and_judged_like_single_plans(problems, plans):
@@ -59,6 +62,7 @@ def test_a_killed_batch_goes_on_to_the_same_bits(
     chunks_before_the_kill, problems, plans, tmp_path, monkeypatch
 ):
     path, save, saved = tmp_path / "plans.npz", many.save_plans, []
+    programs = many._plan_chunk._cache_size()
 
     def save_then_die(*arguments):
         save(*arguments)
@@ -76,7 +80,7 @@ def test_a_killed_batch_goes_on_to_the_same_bits(
         again = plan_in_chunks(problems, seed=3, checkpoint=path)
     assert len(chunks) == 2 - chunks_before_the_kill
     chex.assert_trees_all_equal(again, plans)
-    assert many._plan_chunk._cache_size() == 1
+    assert many._plan_chunk._cache_size() == programs
 
 
 def test_a_checkpoint_of_others_is_refused(problems, plans, tmp_path, robots):
