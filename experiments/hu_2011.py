@@ -19,9 +19,10 @@ import jax
 import numpy as np
 
 from experiments.benchmarks.machine import describe_machine
+from experiments.charging import gradient_charge
+from experiments.pages import fill
 from jffsr.compiling import jit
 from jffsr.optimizers.driver import Outcome, run
-from jffsr.optimizers.interface import sample_box
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.problem import Problem
 from jffsr.study.building import build_problem, build_settings
@@ -38,7 +39,6 @@ SEARCHES = {
     HYBRID: ("hybrid", None),
 }
 GRID = np.unique(np.logspace(np.log10(MEMBERS), np.log10(MEMBERS * GENERATIONS), 60).round())
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 
 def main() -> None:
@@ -60,7 +60,7 @@ def main() -> None:
                 file.write(json.dumps(line) + "\n")
                 file.flush()
     facts, *rows = [json.loads(line) for line in kept.read_text().splitlines()]
-    write_table(page, table(facts, rows))
+    fill(page, table(facts, rows), "Minimum torque: swarm against genes")
     draw(rows, page.with_suffix(".png"))
 
 
@@ -68,7 +68,7 @@ def measured(config_name: str, names: list[str], seeds: int):
     """What holds for all runs, then the runs one by one, as mappings."""
     config = load_config(config_name)
     problem, (_, own) = build_problem(config), build_settings(config)
-    charge = gradient_cost(problem, own.particles, own.starts)
+    charge = gradient_charge(problem, own.particles, own.starts)
     yield {"machine": describe_machine(), "gradient_cost": charge, "free": len(problem.bounds()[0])}
     for name in names:
         kind, options = SEARCHES[name]
@@ -118,30 +118,6 @@ def _facts(problem: Problem, free):
     return terms["torque_integral"].value, terms["attitude_penalty"].value, *peaks
 
 
-@jit
-def _values(problem: Problem, points):
-    return jax.vmap(problem.value)(points)
-
-
-@jit
-def _gradients(problem: Problem, points):
-    return jax.vmap(jax.value_and_grad(problem.smooth_and_value, has_aux=True))(points)
-
-
-def gradient_cost(problem: Problem, members: int, starts: int) -> float:
-    """Time of a gradient, a candidate, over that of an objective, in the batches that the hybrid uses."""
-    many = sample_box(jax.random.key(0), problem, members)
-    few = sample_box(jax.random.key(1), problem, starts)
-    seconds = {_values: [], _gradients: []}
-    jax.block_until_ready((_values(problem, many), _gradients(problem, few)))  # compiles
-    for _ in range(61):  # in turn, so that a load on the machine meets both
-        for function, points in ((_values, many), (_gradients, few)):
-            started = time.perf_counter()
-            jax.block_until_ready(function(problem, points))
-            seconds[function].append((time.perf_counter() - started) / len(points))
-    return round(median(seconds[_gradients]) / median(seconds[_values]), 3)
-
-
 def table(facts: dict, rows: list[dict]) -> str:
     """One line a search: the spread of the index over the seeds, what it is made of, and what it cost."""
     machine = facts["machine"]
@@ -186,13 +162,6 @@ def table(facts: dict, rows: list[dict]) -> str:
             f"Median J of PSO over that of GA: {ratio:.3f}; printed, of one run each: 1.12e6/1.79e6 = 0.626.",
         ]
     return "\n".join(lines)
-
-
-def write_table(page: Path, text: str) -> None:
-    """Put the table between the two marks of the page; a page that is not there yet gets a heading."""
-    old = page.read_text() if page.exists() else f"# Minimum torque: swarm against genes\n\n{BEGIN}\n{END}\n"
-    before, rest = old.split(BEGIN)
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}")
 
 
 def draw(rows: list[dict], path: Path) -> None:

@@ -18,8 +18,8 @@ from pathlib import Path
 from experiments.benchmarks.figure import draw
 from experiments.benchmarks.machine import describe_machine
 from experiments.benchmarks.tables import report
+from experiments.pages import fill
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 MEMORY_ROLLOUTS = 65_536
 
 
@@ -38,7 +38,7 @@ def main() -> None:
         print(f"measured in {time.perf_counter() - started:.0f} s", file=sys.stderr)
     rows = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
     text = report(rows)
-    _write(page, text)
+    fill(page, text, "Rollouts")
     draw(rows, page.with_suffix(".png"))
     print(text)
 
@@ -70,13 +70,6 @@ def _process(module: str, *arguments: str) -> Iterator[dict]:
             yield json.loads(line)
     if process.returncode:
         raise SystemExit(f"{module} {' '.join(arguments)} failed")
-
-
-def _write(page: Path, text: str) -> None:
-    """Put the tables between the two marks of the page; a page that is not there yet gets nothing else."""
-    old = page.read_text(encoding="utf-8") if page.exists() else f"# Rollouts\n\n{BEGIN}\n{END}\n"
-    before, rest = old.split(BEGIN)
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

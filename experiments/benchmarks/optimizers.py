@@ -20,6 +20,7 @@ import numpy as np
 from experiments.benchmarks.machine import describe_machine
 from experiments.benchmarks.opponents.program import Program, compiled
 from experiments.benchmarks.timing import timed
+from experiments.pages import fill
 from jffsr.optimizers.interface import FunctionProblem
 from jffsr.optimizers.registry import Settings, build_phases
 
@@ -56,7 +57,6 @@ PYGMO = {
 }
 SIZES = ((256, 12), (256, 28), (4096, 12), (4096, 28))
 SMALL, MANY = 25, 64
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 
 def main() -> None:
@@ -78,7 +78,8 @@ def main() -> None:
             for row in measured(arguments.quick, arguments.only):
                 file.write(json.dumps(row) + "\n")
                 file.flush()
-    write(page, table([json.loads(line) for line in rows_file.read_text().splitlines()]))
+    rows = [json.loads(line) for line in rows_file.read_text().splitlines()]
+    fill(page, table(rows), "Optimizer benchmark")
 
 
 def measured(quick: bool, only: str = ""):
@@ -195,13 +196,6 @@ def table(rows: list[dict]) -> str:
             + " |"
         )
     return "\n".join(lines)
-
-
-def write(page: Path, text: str) -> None:
-    """Put the table between its marks in the page, or write a page of it alone."""
-    whole = page.read_text(encoding="utf-8") if page.exists() else f"{BEGIN}\n{END}\n"
-    before, _, rest = whole.partition(BEGIN)
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,11 +17,11 @@ from statistics import median
 import jax
 import numpy as np
 
+from experiments.charging import gradient_charge
+from experiments.pages import fill
 from jffsr.errors import InputError
 from jffsr.optimizers.driver import Outcome, run
-from jffsr.optimizers.interface import sample_box
 from jffsr.optimizers.registry import Settings, build_phases
-from jffsr.planning.problem import Problem
 from jffsr.study.building import build_problem, build_settings
 from jffsr.study.config import load_config
 
@@ -31,7 +31,6 @@ QPSO, QPSO_WIDE, HYBRID, GRADIENT = "QPSO", "QPSO, box doubled", "hybrid", "grad
 METHODS = (QPSO, QPSO_WIDE, HYBRID, GRADIENT)
 SWARM = Settings(particles=50, evaluations=20_000, target=None)
 CURVE_GRID = np.unique(np.logspace(1, np.log10(20_000), 70).round())
-BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 
 def main() -> None:
@@ -48,7 +47,7 @@ def main() -> None:
                     file.write(json.dumps(row) + "\n")
                     file.flush()
     rows = [json.loads(line) for line in runs_file.read_text().splitlines()]
-    _write_table(page, _table(rows))
+    fill(page, _table(rows), "Planning benchmark")
     if any(row["scenario"] == SCENARIOS[0] for row in rows):
         _draw([row for row in rows if row["scenario"] == SCENARIOS[0]], page.with_suffix(".png"))
 
@@ -80,7 +79,7 @@ def _measured(name: str, arguments: argparse.Namespace):
     zero = np.zeros(problem.bounds()[0].shape)
     print(f"{name}: J of zero coefficients {float(problem.value(zero)):.4g}", flush=True)
     for method, (searched, kind, chosen) in searches.items():
-        ratio = _gradient_cost(problem, chosen) if kind != "qpso" else 0.0
+        ratio = gradient_charge(problem, chosen.particles, chosen.starts) if kind != "qpso" else 0.0
         if ratio:
             print(f"{name}, {method}: a gradient costs {ratio:.2f} objective evaluations", flush=True)
         phases = build_phases(kind, chosen)
@@ -113,30 +112,6 @@ def _row(name: str, method: str, seed: int, ratio: float, outcome: Outcome) -> d
         last = np.searchsorted(charged, CURVE_GRID, side="right") - 1
         row["curve"] = [float(f"{best[i]:.4g}") if i >= 0 and np.isfinite(best[i]) else None for i in last]
     return row
-
-
-@jax.jit
-def _values(problem: Problem, points):
-    return jax.vmap(problem.value)(points)
-
-
-@jax.jit
-def _gradients(problem: Problem, points):
-    return jax.vmap(jax.value_and_grad(problem.smooth_and_value, has_aux=True))(points)
-
-
-def _gradient_cost(problem: Problem, settings: Settings) -> float:
-    """Time of a gradient, a candidate, over that of an objective, in the batches that the search uses."""
-    many = sample_box(jax.random.key(0), problem, settings.particles)
-    few = sample_box(jax.random.key(1), problem, settings.starts)
-    seconds = {_values: [], _gradients: []}
-    jax.block_until_ready((_values(problem, many), _gradients(problem, few)))  # compiles
-    for _ in range(61):  # in turn, so that a load on the machine meets both
-        for function, points in ((_values, many), (_gradients, few)):
-            started = time.perf_counter()
-            jax.block_until_ready(function(problem, points))
-            seconds[function].append((time.perf_counter() - started) / len(points))
-    return median(seconds[_gradients]) / median(seconds[_values])
 
 
 def _table(rows: list[dict]) -> str:
@@ -178,13 +153,6 @@ def _refusal() -> str:
     except InputError as error:
         return f"`{REFUSED}` is refused before any search:\n\n> {error}"
     raise AssertionError(f"{REFUSED} was not refused")
-
-
-def _write_table(page: Path, table: str) -> None:
-    """Put the table between the two marks of the page; a page that is not there yet gets nothing else."""
-    text = page.read_text() if page.exists() else f"# Planning benchmark\n\n{BEGIN}\n{END}\n"
-    before, rest = text.split(BEGIN)
-    page.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}")
 
 
 def _draw(rows: list[dict], path: Path) -> None:

@@ -9,10 +9,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from experiments.comparison.page import draw, write_page
+from experiments.comparison.page import draw, tables
 from experiments.comparison.scenarios import SCENARIOS
 from experiments.comparison.searches import SEARCHES
 from experiments.comparison.work import read_runs, run_missing
+from experiments.pages import fill
 
 
 def main() -> None:
@@ -31,7 +32,7 @@ def main() -> None:
         chosen = [s for s in SCENARIOS if s.name in arguments.scenarios.split(",")]
         run_missing(kept, chosen, SEARCHES, range(arguments.seeds), arguments.budget)
     runs, facts = read_runs(kept)
-    write_page(page, runs, facts)
+    fill(page, tables(runs, facts), "Optimizers on robots")
     draw(page.with_suffix(".png"), runs, SEARCHES)
 
 

@@ -11,17 +11,13 @@ import numpy as np
 from experiments.comparison.profiles import SearchRun, performance_profiles, standings
 from experiments.comparison.searches import Search
 
-BEGIN, END = "<!-- tables: begin -->", "<!-- tables: end -->"
 TAUS = (1e-1, 1e-3, 1e-6)
 _FACTORS = np.logspace(0, 2, 201)
 
 
-def write_page(page: Path, runs: list[SearchRun], facts: dict[str, Any]) -> None:
-    """Put the tables between the two marks of the page; a page that is not there yet gets a heading."""
-    text = page.read_text() if page.exists() else f"# Optimizers on robots\n\n{BEGIN}\n{END}\n"
-    before, rest = text.split(BEGIN)
-    tables = "\n\n".join([_facts(facts), _wins(runs), _solved(runs), _medians(runs)])
-    page.write_text(f"{before}{BEGIN}\n{tables}\n{END}{rest.split(END)[1]}")
+def tables(runs: list[SearchRun], facts: dict[str, Any]) -> str:
+    """All that the page says of the runs."""
+    return "\n\n".join([_facts(facts), _wins(runs), _solved(runs), _medians(runs)])
 
 
 def _facts(facts: dict[str, Any]) -> str:

@@ -7,24 +7,18 @@ import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import jax
 import numpy as np
 
 from experiments.benchmarks.machine import describe_machine
+from experiments.charging import gradient_charge
 from experiments.comparison.profiles import SearchRun
 from experiments.comparison.scenarios import Scenario
 from experiments.comparison.searches import MEMBERS, STARTS, Search
-from jffsr.compiling import program
 from jffsr.optimizers.driver import Outcome, run
-from jffsr.optimizers.interface import sample_box
-from jffsr.parallel.devices import all_devices
-from jffsr.parallel.mapping import evaluate
 from jffsr.planning.problem import Problem
-
-_TURNS = 31
 
 
 def run_missing(
@@ -44,16 +38,12 @@ def run_missing(
 
         if not lines:
             keep({"machine": describe_machine(), "budget": budget, "members": MEMBERS, "starts": STARTS})
+        problems = {scenario.name: scenario.problem() for scenario in scenarios}
+        # Before any search: a load on the machine later on changes no charge.
         for scenario in scenarios:
-            missing = [
-                (search, [seed for seed in seeds if (scenario.name, search.label, seed) not in done])
-                for search in searches
-            ]
-            if not any(left for _, left in missing):
-                continue
-            problem = scenario.problem()
             if scenario.name not in charges:
-                charges[scenario.name] = _gradient_charge(problem)
+                problem = problems[scenario.name]
+                charges[scenario.name] = gradient_charge(problem, MEMBERS, STARTS)
                 keep(
                     {
                         "scenario": scenario.name,
@@ -62,8 +52,12 @@ def run_missing(
                         "gradient_charge": charges[scenario.name],
                     }
                 )
-            for search, left in missing:
-                _search(scenario.name, problem, search, left, budget, charges[scenario.name], keep)
+        for scenario in scenarios:
+            for search in searches:
+                left = [seed for seed in seeds if (scenario.name, search.label, seed) not in done]
+                _search(
+                    scenario.name, problems[scenario.name], search, left, budget, charges[scenario.name], keep
+                )
 
 
 def _search(name: str, problem: Problem, search: Search, seeds, budget: int, charge: float, keep) -> None:
@@ -107,28 +101,3 @@ def read_runs(kept: Path) -> tuple[list[SearchRun], dict[str, Any]]:
         else:
             facts |= line
     return runs, facts
-
-
-@program()
-def _values(problem: Problem, points):
-    return evaluate(problem.value, points)
-
-
-@program()
-def _gradients(problem: Problem, points):
-    return evaluate(jax.value_and_grad(problem.smooth_and_value, has_aux=True), points)
-
-
-def _gradient_charge(problem: Problem) -> float:
-    """Time of a gradient over that of an objective, a candidate each, in the batches that the searches use."""
-    many = np.asarray(sample_box(jax.random.key(0), problem, MEMBERS))
-    few = np.asarray(sample_box(jax.random.key(1), problem, STARTS))
-    seconds: dict[Any, list[float]] = {_values: [], _gradients: []}
-    with all_devices():
-        jax.block_until_ready((_values(problem, many), _gradients(problem, few)))  # compiles
-        for _ in range(_TURNS):  # in turn, so that a load on the machine meets both
-            for function, points in ((_values, many), (_gradients, few)):
-                started = time.perf_counter()
-                jax.block_until_ready(function(problem, points))
-                seconds[function].append((time.perf_counter() - started) / len(points))
-    return round(median(seconds[_gradients]) / median(seconds[_values]), 3)

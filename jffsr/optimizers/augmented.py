@@ -21,8 +21,8 @@ import jax.numpy as jnp
 
 from jffsr.optimizers.constraints import ConstrainedProblem, Evaluation, merit
 from jffsr.optimizers.driver import Phase, Stop
-from jffsr.optimizers.gradient import LBFGS, Descent, GradientDescent, GradientState, _all_to_box, _select
-from jffsr.optimizers.interface import Population, Progress, finite_or_inf
+from jffsr.optimizers.gradient import LBFGS, GradientDescent, GradientState, beginning, select, usable
+from jffsr.optimizers.interface import Population, Progress
 from jffsr.parallel.mapping import evaluate
 from jffsr.types import Array, Scalar, Vector
 
@@ -119,7 +119,7 @@ class AugmentedLagrangian:
         before = state.inner.descent
         smooth, value, gradient, multipliers = self._evaluate(problem, state)
         same = (multipliers.penalty == state.multipliers.penalty) & ~jnp.isinf(state.multipliers.miss)
-        memory = jax.vmap(partial(self._memory, inner=self.descent._transformation()))(
+        memory = jax.vmap(partial(self._memory, inner=self.descent.transformation()))(
             before.memory, before.point, gradient, state.begins, same
         )
         inner = replace(state.inner, descent=replace(before, memory=memory))
@@ -135,12 +135,12 @@ class AugmentedLagrangian:
         final = state.accuracy <= self.descent.gradient_tolerance
         arrived = jnp.where(over, ~descent.active | (small & final), state.arrived)
         settled = jnp.where(over, ~descent.active | small, state.settled)
-        descent = _select(over, self._again(problem, descent), descent)
+        descent = select(over, replace(descent, **beginning(problem, descent.point)), descent)
         descent = replace(descent, active=descent.active & ~ended)
         progress = replace(inner.progress, converged=~jnp.any(descent.active))
         return AugmentedState(
             GradientState(inner.key, descent, progress),
-            _select(active, multipliers, state.multipliers),
+            select(active, multipliers, state.multipliers),
             begins=jnp.where(active, over | (state.begins & ~begun), state.begins),
             settled=settled,
             arrived=arrived,
@@ -169,15 +169,7 @@ class AugmentedLagrangian:
         smooth, value, multipliers, in_box = evaluate(
             one, (descent.inside, state.multipliers, state.begins, state.settled, state.looseness)
         )
-        _, pull_back = jax.vjp(partial(_all_to_box, problem), descent.trial)
-        (gradient,) = pull_back(in_box)
-        usable = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)
-        return (
-            jnp.where(usable, smooth, jnp.inf),
-            finite_or_inf(value),
-            jnp.where(usable[:, None], gradient, 0.0),
-            multipliers,
-        )
+        return *usable(problem, descent.trial, smooth, value, in_box), multipliers
 
     def _updated(self, old: Multipliers, found: Evaluation, begins: Scalar, settled: Scalar) -> Multipliers:
         """The multipliers of a round, from where the last one ended; its first sets the penalty alone."""
@@ -198,8 +190,8 @@ class AugmentedLagrangian:
             penalty=jnp.where(first, balance, raised),
             miss=miss,
         )
-        usable = begins & jnp.isfinite(miss) & jnp.isfinite(value)
-        return jax.tree.map(lambda a, b: jnp.where(usable, a, b), new, old)
+        known = begins & jnp.isfinite(miss) & jnp.isfinite(value)
+        return jax.tree.map(lambda a, b: jnp.where(known, a, b), new, old)
 
     def _augmented(self, m: Multipliers, found: Evaluation) -> Scalar:
         c, g = found.equality, found.inequality + self.margin
@@ -208,23 +200,6 @@ class AugmentedLagrangian:
             found.smooth
             + jnp.sum(m.equality * c + 0.5 * m.penalty * c**2)
             + jnp.sum(shifted**2 - m.inequality**2) / (2 * m.penalty)
-        )
-
-    def _again(self, problem: ConstrainedProblem, descent: Descent) -> Descent:
-        """The descents anew from where they stand; the best points are kept."""
-        point, count = descent.point, descent.point.shape[0]
-        return replace(
-            descent,
-            trial=point,
-            inside=_all_to_box(problem, point),
-            smooth=jnp.full(count, jnp.inf),
-            gradient=jnp.zeros_like(point),
-            direction=jnp.zeros_like(point),
-            length=jnp.ones(count),
-            too_short=jnp.zeros(count),
-            too_long=jnp.full(count, jnp.inf),
-            stalled=jnp.zeros(count, dtype=int),
-            active=jnp.ones(count, dtype=bool),
         )
 
     def _memory(self, memory, point: Vector, gradient: Vector, begins: Scalar, same: Scalar, inner):

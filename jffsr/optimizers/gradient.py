@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +31,8 @@ from jffsr.optimizers.interface import (
 )
 from jffsr.parallel.mapping import evaluate
 from jffsr.types import Array, Scalar, Vector
+
+T = TypeVar("T")
 
 LBFGS = "lbfgs"
 ADAM = "adam"
@@ -95,7 +98,7 @@ class GradientDescent:
     method: str = field(default=LBFGS, metadata={"static": True})
     memory: int = field(default=10, metadata={"static": True})
 
-    def _transformation(self) -> optax.GradientTransformation:
+    def transformation(self) -> optax.GradientTransformation:
         if self.method == ADAM:
             return optax.scale_by_adam()
         return optax.scale_by_lbfgs(memory_size=self.memory)
@@ -117,22 +120,12 @@ class GradientDescent:
             positions, values = population.positions[order], values[order]
         lower, upper = problem.bounds()
         points = jax.vmap(lambda x: from_box(x, lower, upper))(positions)
-        count = points.shape[0]
         descent = Descent(
             point=points,
-            trial=points,
-            inside=_all_to_box(problem, points),
-            smooth=jnp.full(count, jnp.inf),
-            gradient=jnp.zeros_like(points),
-            direction=jnp.zeros_like(points),
-            length=jnp.ones(count),
-            too_short=jnp.zeros(count),
-            too_long=jnp.full(count, jnp.inf),
-            memory=jax.vmap(self._transformation().init)(points),
-            stalled=jnp.zeros(count, dtype=int),
-            active=jnp.ones(count, dtype=bool),
+            memory=jax.vmap(self.transformation().init)(points),
             best_position=positions,
             best_value=values,
+            **beginning(problem, points),
         )
         return GradientState(key, descent, replace(no_progress(positions[0]), best_value=values[0]))
 
@@ -145,14 +138,7 @@ class GradientDescent:
             return problem.smooth_and_value(x, self.looseness)
 
         (smooth, value), in_box = evaluate(jax.value_and_grad(objective, has_aux=True), inside)
-        _, pull_back = jax.vjp(partial(_all_to_box, problem), trial)
-        (gradient,) = pull_back(in_box)
-        usable = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)
-        return (
-            jnp.where(usable, smooth, jnp.inf),
-            finite_or_inf(value),
-            jnp.where(usable[:, None], gradient, 0.0),
-        )
+        return usable(problem, trial, smooth, value, in_box)
 
     def step(self, problem: OptimizationProblem, state: GradientState) -> GradientState:
         """One trial of every active start."""
@@ -174,7 +160,7 @@ class GradientDescent:
         lost = ~jnp.isfinite(descent.smooth) & ~jnp.isfinite(smooth)
         fresh = sample_box(jax.random.fold_in(state.key, progress.iteration), problem, trial.shape[0])
         again = replace(descent, point=jax.vmap(lambda x: from_box(x, lower, upper))(fresh))
-        advanced = _select(descent.active, _select(lost, again, advanced), descent)
+        advanced = select(descent.active, select(lost, again, advanced), descent)
         following = advanced.point + advanced.length[:, None] * advanced.direction
         advanced = replace(
             advanced,
@@ -198,7 +184,7 @@ class GradientDescent:
 
     def _advance(self, old: Descent, trial: Vector, smooth: Scalar, gradient: Vector) -> Descent:
         """One start after its trial: the next direction, or another step along the old one."""
-        update, memory = self._transformation().update(gradient, old.memory, trial)
+        update, memory = self.transformation().update(gradient, old.memory, trial)
         direction = -update
         if self.method == ADAM:
             accepted, too_short, too_long = jnp.isfinite(smooth), old.too_short, old.too_long
@@ -257,11 +243,46 @@ class GradientDescent:
         return Population(state.descent.best_position, state.descent.best_value)
 
 
+def beginning(problem: OptimizationProblem, points: Array) -> dict[str, Array]:
+    """The fields of descents that begin at the points (k, d): the first trial is there, a step of zero."""
+    count = points.shape[0]
+    return {
+        "trial": points,
+        "inside": _all_to_box(problem, points),
+        "smooth": jnp.full(count, jnp.inf),
+        "gradient": jnp.zeros_like(points),
+        "direction": jnp.zeros_like(points),
+        "length": jnp.ones(count),
+        "too_short": jnp.zeros(count),
+        "too_long": jnp.full(count, jnp.inf),
+        "stalled": jnp.zeros(count, dtype=int),
+        "active": jnp.ones(count, dtype=bool),
+    }
+
+
+def usable(
+    problem: OptimizationProblem, trial: Array, smooth: Array, value: Array, in_box: Array
+) -> tuple[Array, Array, Array]:
+    """Smooth values (k,), true values (k,) and gradients (k, d) as a descent takes them.
+
+    trial (k, d) in unconstrained coordinates, in_box (k, d) the gradients by the candidates; what is not finite
+    becomes +inf, with a gradient of zero.
+    """
+    _, pull_back = jax.vjp(partial(_all_to_box, problem), trial)
+    (gradient,) = pull_back(in_box)
+    finite = jnp.isfinite(smooth) & jnp.all(jnp.isfinite(gradient), axis=1)
+    return (
+        jnp.where(finite, smooth, jnp.inf),
+        finite_or_inf(value),
+        jnp.where(finite[:, None], gradient, 0.0),
+    )
+
+
+def select(which: Array, yes: T, no: T) -> T:
+    """For each start (k,) the one or the other of two trees of arrays with leading axes (k,)."""
+    return jax.tree.map(lambda a, b: jnp.where(which.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), yes, no)
+
+
 def _all_to_box(problem: OptimizationProblem, points: Array) -> Array:
     lower, upper = problem.bounds()
     return jax.vmap(lambda z: to_box(z, lower, upper))(points)
-
-
-def _select(which: Array, yes: Descent, no: Descent) -> Descent:
-    """For each start (k,) the one or the other."""
-    return jax.tree.map(lambda a, b: jnp.where(which.reshape((-1,) + (1,) * (a.ndim - 1)), a, b), yes, no)

@@ -25,9 +25,18 @@ from jffsr.types import Array, Scalar, Vector
 def design_gradient(problem: Problem, free: Vector, mass_exponent: float = 0.0) -> Design:
     """Derivatives of the smooth index by the link lengths (n,), a factor of 1 each, and by the mounts (k, 3), 1/m.
 
-    free (k,) holds a plan's free numbers. mass_exponent is that of `jffsr.redesigned`. Arrays on the host.
+    free (k,) holds a plan's free numbers. mass_exponent is that of `jffsr.redesigned`. Arrays on the host. InputError
+    for a problem with an uncertainty.
     """
+    _check_certain(problem)
     return jax.device_get(_gradient(problem, np.asarray(free, dtype=float), np.asarray(float(mass_exponent))))
+
+
+def _check_certain(problem: Problem) -> None:
+    if problem.uncertainty is not None:
+        raise InputError(
+            "the problem has an uncertainty, whose robots a design would not change; leave it out"
+        )
 
 
 @program(once=True)
@@ -61,10 +70,7 @@ class CoDesign:
         cls, problem: Problem, length: float = 0.2, mount: float = 0.0, mass_exponent: float = 0.0
     ) -> CoDesign:
         """A checked co-design; InputError where a bound makes no robot, and for a problem with an uncertainty."""
-        if problem.uncertainty is not None:
-            raise InputError(
-                "the problem has an uncertainty, whose robots a design would not change; leave it out"
-            )
+        _check_certain(problem)
         if not 0 <= length < 1:
             raise InputError(f"length is {length!r}; the change of a factor of 1, in [0, 1), is expected")
         if not 0 <= mount < np.inf:

@@ -23,7 +23,7 @@ from jffsr.planning.plan import check_precision
 from jffsr.planning.plans_file import load_plans, save_plans
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances, result_code, settled
-from jffsr.planning.search import search_of, searchable
+from jffsr.planning.search import found_index, search_of, searchable
 from jffsr.planning.verification import Verification, verify
 from jffsr.robots.stacking import first_unlike
 from jffsr.rollouts.motion import Motion
@@ -206,9 +206,12 @@ def _plan_chunk(batch, alike, seed, lengths, step_factor, tolerances, with_histo
         ended = state.progress.converged | settled(history[0])
         return Plans(
             result=result_code(problem, verification, ended, tolerances),
-            cost=problem.objective.value(problem.robot, motion)
-            if problem.constraints
-            else state.progress.best_value,
+            cost=found_index(
+                problem,
+                state.progress.best_value,
+                problem.objective.value(problem.robot, motion),
+                verification.measure,
+            ),
             free=free,
             motion=motion,
             verification=verification,

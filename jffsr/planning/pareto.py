@@ -58,11 +58,13 @@ def plan_pareto(
     """The Pareto set of a planning problem; its points are free numbers, its values weighted terms.
 
     objectives: names of terms, or groups of names whose sum is one objective; each term by default. Every term has to
-    count in one of them. Keywords are those of `jffsr.pareto`. A problem with constraints is refused.
+    count in one of them. Keywords are those of `jffsr.pareto`. A problem with constraints or an uncertainty is refused.
     """
     check_precision("float64")
     if problem.constraints:
         raise InputError("the problem has constraints, which a Pareto set of its terms does not keep")
+    if problem.uncertainty is not None:
+        raise InputError("the problem has an uncertainty, which measures its whole index and no term of it")
     names = [term.name for term in problem.objective.terms]
     chosen = names if objectives is None else objectives
     groups = tuple((group,) if isinstance(group, str) else tuple(group) for group in chosen)

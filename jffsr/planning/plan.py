@@ -22,7 +22,7 @@ from jffsr.planning.codesign import CoDesign
 from jffsr.planning.export import joint_table, to_csv, to_mat
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Result, Tolerances, explain, result_code, stands_still
-from jffsr.planning.search import search_of
+from jffsr.planning.search import found_index, search_of
 from jffsr.planning.sensitivity import Sensitivity, prepare_sensitivity, sensitivity
 from jffsr.planning.stopwatch import Stopwatch
 from jffsr.planning.verification import Verification, verify
@@ -160,12 +160,10 @@ def solve(
 def _cost(
     problem: Problem, outcome: Outcome, terms: dict[str, TermValue], verification: Verification
 ) -> float:
-    """The index of what was found; the search's own number is a merit where there are constraints."""
-    if not problem.constraints or not np.isfinite(outcome.best_value):
+    if not np.isfinite(outcome.best_value):
         return outcome.best_value
-    if problem.uncertainty is not None:
-        return float(verification.measure)
-    return float(sum(term.weighted for term in terms.values()))
+    nominal = sum(float(term.weighted) for term in terms.values())
+    return float(found_index(problem, outcome.best_value, nominal, verification.measure))
 
 
 @jax.jit

@@ -10,6 +10,7 @@ from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.planning.codesign import CoDesign
 from jffsr.planning.problem import Problem
+from jffsr.types import Scalar
 
 
 def search_of(
@@ -30,3 +31,13 @@ def search_of(
 def searchable(problem: Problem | CoDesign) -> OptimizationProblem:
     """The problem itself, or with constraints the one whose value is the merit."""
     return Feasible(problem) if problem.constraints else problem
+
+
+def found_index(problem: Problem, best: Scalar, nominal: Scalar, measure: Scalar) -> Scalar:
+    """The index of what a search found: its best value, but where that is a merit, under constraints.
+
+    nominal is the index of the robot itself at the planner's step, measure that over the uncertain robots.
+    """
+    if not problem.constraints:
+        return best
+    return nominal if problem.uncertainty is None else measure

@@ -130,8 +130,10 @@ def run_planning(
             return Run(folder, None, interrupted=True)
         finally:
             close()
+    # Spread over the devices of all processes, and so a matter of all of them.
+    robust = robust_summary(found, config.robust)
     if is_first():
-        _finish(folder, config, found, [phase.name for phase in phases])
+        _finish(folder, config, found, [phase.name for phase in phases], robust)
     return Run(folder, _summary(folder))
 
 
@@ -158,9 +160,11 @@ def _summary(folder: RunFolder) -> dict[str, Any]:
     return json.loads(first_does(lambda: json.dumps(folder.read_summary()).encode()))
 
 
-def _finish(folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str]) -> None:
+def _finish(
+    folder: RunFolder, config: PlanningConfig, found: Plan, phase_names: list[str], robust: dict[str, Any]
+) -> None:
     """Write the arrays, then the summary, which marks the run as finished."""
     save_dataset(plan_dataset(found, config.name, phase_names), folder.result)
     summary = plan_summary(found, config.name, config.seed, build_tolerances(config))
-    write_json(folder.summary, summary | robust_summary(found, config.robust))
+    write_json(folder.summary, summary | robust)
     folder.checkpoint.unlink(missing_ok=True)

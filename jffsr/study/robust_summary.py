@@ -43,9 +43,10 @@ def robust_lines(summary: dict[str, Any] | None) -> list[str]:
     """The same in a line for the terminal; none where it was not asked for."""
     if not summary:
         return []
-    low, middle, high = (summary["quantiles"][f"{q:g}"] for q in _QUANTILES)
-    fresh = summary["fresh_robots"]
+    values = (summary["value"], *(summary["quantiles"][f"{q:g}"] for q in _QUANTILES))
+    # What is not finite is written as null.
+    value, low, middle, high = ("not finite" if x is None else f"{x:.4g}" for x in values)
     return [
-        f"  robust        {summary['measure']} of J {summary['value']:.4g}; over {fresh} other robots J is "
-        f"{middle:.4g} ({low:.4g} to {high:.4g} for nine in ten), met by {100 * summary['share_met']:.0f} %"
+        f"  robust        {summary['measure']} of J {value}; over {summary['fresh_robots']} other robots J is {middle} "
+        f"({low} to {high} for nine in ten), met by {100 * summary['share_met']:.0f} %"
     ]

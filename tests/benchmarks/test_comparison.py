@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from experiments.comparison.page import BEGIN, END, write_page
+from experiments.comparison.page import tables
 from experiments.comparison.scenarios import SCENARIOS
 from experiments.comparison.searches import MEMBERS, SEARCHES, STARTS
 from experiments.comparison.work import read_runs
+from experiments.pages import BEGIN, END, fill
 
 BUDGET, CHARGE = 5000, 3.5
 
@@ -52,7 +53,7 @@ def test_runs_are_read_as_they_were_kept_and_become_a_page(tmp_path):
     assert [run.final for run in runs] == [2.0, 3.0]
     assert runs[0].best[0] == np.inf
     page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
-    write_page(page, runs, facts)
+    fill(page, tables(runs, facts), "Optimizers on robots")
     text = page.read_text()
     assert text.startswith("before")
     assert text.endswith("after\n")

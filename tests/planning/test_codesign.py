@@ -14,6 +14,7 @@ from jffsr.errors import InputError
 from jffsr.optimizers.registry import Settings
 from jffsr.planning.codesign import CoDesign, design_gradient
 from jffsr.planning.plan import solve
+from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.builder import build_robot
 from jffsr.robots.design import Design, mounted_joints, no_change, redesigned
 from jffsr.robots.loading import describe_robot
@@ -115,6 +116,13 @@ def test_a_candidate_holds_the_plan_and_the_design(problem):
 def test_bounds_that_make_no_robot_are_refused(problem, keywords):
     with pytest.raises(InputError, match="is expected"):
         CoDesign.within(problem, **keywords)
+
+
+def test_an_uncertain_problem_is_refused(problem):
+    uncertain = dataclasses.replace(problem, uncertainty=Uncertainty.sampled(problem.robot, 2))
+    for ask in (lambda: design_gradient(uncertain, FREE), lambda: CoDesign.within(uncertain)):
+        with pytest.raises(InputError, match="the problem has an uncertainty, whose robots"):
+            ask()
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from wu6_problems import limited
 from jffsr.errors import InputError
 from jffsr.objectives.constraints import FinalAttitude
 from jffsr.planning.pareto import plan_pareto
+from jffsr.planning.uncertainty import Uncertainty
 
 RATES = ("joint_rate", "joint_acceleration")
 
@@ -54,3 +55,9 @@ def test_bad_groups_are_refused(problem):
     constrained = replace(problem, constraints=(FinalAttitude(np.array([1.0, 0, 0, 0])),))
     with pytest.raises(InputError, match="the problem has constraints"):
         plan_pareto(constrained)
+
+
+def test_an_uncertain_problem_is_refused(problem):
+    uncertain = replace(problem, uncertainty=Uncertainty.sampled(problem.robot, 2))
+    with pytest.raises(InputError, match="the problem has an uncertainty"):
+        plan_pareto(uncertain, ["attitude_change", RATES])

@@ -11,8 +11,10 @@ import pytest
 from wu6_problems import limited, wu6_problem
 
 from jffsr.errors import InputError
+from jffsr.objectives.constraints import FinalAttitude
 from jffsr.optimizers.registry import Settings
 from jffsr.planning.plan import solve
+from jffsr.planning.search import found_index
 from jffsr.planning.spread import index_over
 from jffsr.planning.uncertainty import Uncertainty
 from jffsr.robots.perturbation import perturbed
@@ -79,6 +81,18 @@ def test_a_plan_for_the_worst_case_is_less_bad_in_the_worst_case(problem):
         worst[name] = np.max(index_over(problem, plan.free, uncertain.robots))
     np.testing.assert_allclose(worst["robust"], plan.cost, rtol=1e-12)
     assert worst["robust"] < worst["nominal"]
+
+
+def test_what_was_found_is_the_index_and_no_merit(problem):
+    """Under constraints the search's own number is a merit: the index is the nominal one, or its measure."""
+    uncertain = replace(problem, uncertainty=Uncertainty.sampled(problem.robot, 2))
+    held = (FinalAttitude(np.array([1.0, 0, 0, 0])),)
+    found = {
+        (name, len(constraints)): found_index(replace(asked, constraints=constraints), 7.0, 2.0, 3.0)
+        for name, asked in (("certain", problem), ("uncertain", uncertain))
+        for constraints in ((), held)
+    }
+    assert found == {("certain", 0): 7, ("certain", 1): 2, ("uncertain", 0): 7, ("uncertain", 1): 3}
 
 
 @pytest.mark.parametrize(
