@@ -35,7 +35,7 @@ def rate_bounds(limits: Limits, position: Vector, last_rate: Vector, step: Scala
     none that leads past a position limit, at the end of the step or of the shortest braking after it. Where these
     contradict each other, which a start inside all of them excludes, the position counts first.
     """
-    change = jnp.asarray(limits.acceleration) * step
+    change = _finite_times(jnp.asarray(limits.acceleration), step)
     upper_stop = _approach(jnp.asarray(limits.position_upper) - position, change, step)
     lower_stop = -_approach(position - jnp.asarray(limits.position_lower), change, step)
     rate = jnp.asarray(limits.velocity)
@@ -44,18 +44,25 @@ def rate_bounds(limits: Limits, position: Vector, last_rate: Vector, step: Scala
     return lower, jnp.maximum(lower, upper)
 
 
+def _finite_times(limit: Array, factor: Array) -> Array:
+    """limit * factor, infinite where the limit is: without the detour its gradient by the factor would be NaN."""
+    finite = jnp.isfinite(limit)
+    return jnp.where(finite, jnp.where(finite, limit, 0.0) * factor, jnp.inf)
+
+
 def _approach(gap: Vector, change: Vector, step: Scalar) -> Vector:
     """Largest rate (n,) towards a limit that is `gap` away, from which steps of -change stop in time.
 
     Rate v for one step and then v - change, v - 2 change ... cover h ((k + 1) v - change k (k + 1)/2), k being
     the steps until rest: linear in pieces, so that its inverse is exact.
     """
-    braked = jnp.isfinite(change) & (change > 0) & jnp.isfinite(gap)
-    safe_gap, safe_change = jnp.where(braked, gap, 1.0), jnp.where(braked, change, 1.0)
+    braked = jnp.isfinite(change) & (change > 0)
+    safe_change = jnp.where(braked, change, 1.0)
+    there = jnp.isfinite(gap)
+    safe_gap = jnp.where(there, gap, 1.0)
     share = jax.lax.stop_gradient(jnp.maximum(safe_gap, 0.0) / (safe_change * step))
-    k = jnp.floor(0.5 * (jnp.sqrt(1 + 8 * share) - 1))
-    braking = (safe_gap / step + 0.5 * safe_change * k * (k + 1)) / (k + 1)
-    return jnp.where(braked, braking, gap / step)
+    k = jnp.where(braked, jnp.floor(0.5 * (jnp.sqrt(1 + 8 * share) - 1)), 0.0)
+    return jnp.where(there, (safe_gap / step + 0.5 * safe_change * k * (k + 1)) / (k + 1), jnp.inf)
 
 
 def scaled(task: Vector, rest: Vector, lower: Vector, upper: Vector) -> Bounded:
@@ -67,8 +74,9 @@ def scaled(task: Vector, rest: Vector, lower: Vector, upper: Vector) -> Bounded:
 def task_share(task: Vector, rest: Vector, lower: Vector, upper: Vector) -> tuple[Scalar, Array]:
     """The largest share in [0, 1] for which rest + share task is inside, and the joint that decides it."""
     room = jnp.where(task > 0, upper - rest, lower - rest)
-    moves = task != 0
-    each = jnp.where(moves, room / jnp.where(moves, task, 1.0), jnp.inf)
+    # Infinite room is left out before it is divided, which would make the gradient NaN.
+    bounded = (task != 0) & jnp.isfinite(room)
+    each = jnp.where(bounded, jnp.where(bounded, room, 1.0) / jnp.where(bounded, task, 1.0), jnp.inf)
     joint = jnp.argmin(each)
     return jnp.clip(each[joint], 0.0, 1.0), joint
 

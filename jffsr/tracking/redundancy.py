@@ -13,23 +13,24 @@ from typing import NamedTuple, Protocol
 import jax
 import jax.numpy as jnp
 
-from jffsr.dynamics.base_mode import base_freedom
 from jffsr.dynamics.kinematics import Kinematics, kinematics
-from jffsr.dynamics.momentum import base_twist, generalized_jacobian, inertia_blocks
+from jffsr.dynamics.momentum import generalized_jacobian
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply, quaternion_to_rotation_vector
 from jffsr.tracking.damping import Damping
+from jffsr.tracking.free_base import Response
 from jffsr.tracking.inverses import filtered_inverse, null_space
 from jffsr.types import Array, Matrix, Twist, Vector
 
 
 class Situation(NamedTuple):
-    """What a secondary task may look at: the robot, its state and kinematics, and how its base moves."""
+    """What a secondary task may look at: the robot, its state and kinematics, and how base and tool respond."""
 
     robot: Robot
     state: State
     kin: Kinematics
+    response: Response
     start: State
     momentum: Twist
     end_effector: str | None
@@ -47,7 +48,7 @@ class SecondaryTask(Protocol):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class JointLimitAvoidance:
-    """Joints drawn to the middle of their ranges: rates -gain of the gradient of the mean of ((q - mid)/half range)^2/2.
+    """Joints drawn to the middle of their ranges: down the gradient of the mean of ((q - mid)/half range)^2/2.
 
     Liegeois 1977. gain, 1/s per unit of the half range squared; joints without limits are left alone.
     """
@@ -96,7 +97,9 @@ class ManipulabilityGradient:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class BaseAttitudeHeld:
-    """The base's attitude kept at that of the start: a second task on the base's angular velocity (Nenchev et al. 1992).
+    """The base's attitude kept at that of the start: a second task on the base's angular velocity.
+
+    Nenchev, Umetani and Yoshida 1992.
 
     gain, 1/s, feeds back the rotation since the start; decoupled, static, solves for the base on its own and projects
     the rates afterwards (Chiaverini 1997).
@@ -110,7 +113,7 @@ class BaseAttitudeHeld:
     ) -> tuple[Vector, Matrix]:
         """The rates with the base's task added, and what it leaves of the space."""
         s = situation
-        turn, still = base_turning(s)
+        turn, still = s.response.base_map[3:], s.response.base_drift[3:]
         since = quaternion_multiply(s.state.base_quaternion, quaternion_conjugate(s.start.base_quaternion))
         wanted = -self.gain * quaternion_to_rotation_vector(since) - still
         inside = turn @ space
@@ -119,14 +122,3 @@ class BaseAttitudeHeld:
         else:
             added = space @ (filtered_inverse(inside, damping) @ (wanted - turn @ rates))
         return rates + added, space @ null_space(inside, damping)
-
-
-def base_turning(situation: Situation) -> tuple[Matrix, Vector]:
-    """Angular velocity of the base in I: the map (3, n) from the joint rates, and what momentum alone gives (3,)."""
-    s = situation
-    free, n = base_freedom(s.base_mode), s.robot.num_joints
-    if free < 6:
-        return jnp.zeros((3, n)), jnp.zeros(3)
-    h_b, h_bm, _ = inertia_blocks(s.robot, s.kin)
-    still = base_twist(s.robot, s.kin, jnp.zeros(n), s.momentum, s.base_mode)
-    return -jnp.linalg.solve(h_b, h_bm)[3:], still[3:]

@@ -10,14 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING, base_freedom
-from jffsr.dynamics.kinematics import Kinematics, end_effector_pose, jacobians, kinematics
-from jffsr.dynamics.momentum import base_twist, generalized_jacobian
+from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import JointGrid, Motion
 from jffsr.rollouts.rollout import check_steps, rollout_grid
 from jffsr.tracking.damping import raised_cosine
+from jffsr.tracking.free_base import response
 from jffsr.tracking.inverses import TRANSPOSE, damping_for, null_space, rate_solution, singular_values
 from jffsr.tracking.limits import IGNORE, REDISTRIBUTE, Bounded, rate_bounds, redistributed, scaled
 from jffsr.tracking.redundancy import Situation
@@ -100,6 +100,7 @@ class _Seen(NamedTuple):
 
     moving: _Moving
     base_twist: Array
+    arrival_twist: Array
     target: ToolTarget
     tool_position: Vector3
     tool_quaternion: Quaternion
@@ -117,7 +118,8 @@ def _tracked(
     def advance(moving: _Moving, time: Scalar) -> tuple[_Moving, _Seen]:
         state = State(moving.base_position, moving.base_quaternion, moving.joint_position)
         kin = kinematics(robot, state)
-        situation = Situation(robot, state, kin, start, momentum, end_effector, base_mode)
+        answer = response(robot, kin, momentum, end_effector, base_mode)
+        situation = Situation(robot, state, kin, answer, start, momentum, end_effector, base_mode)
         seen = _rates(situation, target, tracker, time, step, moving)
         inner = rollout_grid(
             robot, _held_grid(moving.joint_position, seen.held, step, tracker), state, momentum, base_mode
@@ -128,7 +130,7 @@ def _tracked(
             moving.joint_position + step * seen.held,
             seen.held,
         )
-        return following, seen._replace(base_twist=inner.base_twist[0])
+        return following, seen
 
     rate = (
         jnp.zeros(robot.num_joints) if initial.joint_velocity is None else jnp.asarray(initial.joint_velocity)
@@ -141,7 +143,7 @@ def _tracked(
         seen.tool_position, seen.tool_quaternion, seen.target.position, seen.target.quaternion
     )
     return Tracked(
-        motion=_motion(robot, seen, rate, time, step, momentum, base_mode),
+        motion=_motion(seen, rate, time, step, momentum, base_mode),
         target_position=seen.target.position,
         target_quaternion=seen.target.quaternion,
         target_twist=seen.target.twist,
@@ -163,8 +165,7 @@ def _rates(
     """The rates to hold from this time on, and all that is reported of it."""
     robot, kin = s.robot, s.kin
     position, quaternion = end_effector_pose(robot, kin, s.end_effector)
-    full = generalized_jacobian(robot, kin, s.end_effector, s.base_mode)
-    jacobian = tracked_rows(tracker.freedom, quaternion, full)
+    jacobian = tracked_rows(tracker.freedom, quaternion, s.response.jacobian)
     now = target(time)
     velocity = now.twist
     if tracker.feedforward == MEAN:
@@ -172,19 +173,18 @@ def _rates(
     gains = jnp.repeat(jnp.stack([jnp.asarray(tracker.position_gain), jnp.asarray(tracker.attitude_gain)]), 3)
     off = tracked_error(tracker.freedom, position, quaternion, now.position, now.quaternion)
     wanted = tracked_rows(tracker.freedom, quaternion, velocity - gains * off)
-    drift = tracked_rows(
-        tracker.freedom, quaternion, _drift(robot, kin, s.momentum, s.end_effector, s.base_mode)
-    )
+    drift = tracked_rows(tracker.freedom, quaternion, s.response.drift)
     rates, rest, bounded = _resolved(s, tracker, jacobian, wanted, drift, moving, step)
     sigma = singular_values(jacobian)
     return _Seen(
         moving=moving,
-        base_twist=jnp.zeros(6),
+        base_twist=s.response.base_twist(bounded.rates),
+        arrival_twist=s.response.base_twist(moving.joint_rate),
         target=now,
         tool_position=position,
         tool_quaternion=quaternion,
         singular_values=sigma,
-        determinant=jnp.linalg.det(full) if robot.num_joints == 6 else None,
+        determinant=jnp.linalg.det(s.response.jacobian) if robot.num_joints == 6 else None,
         commanded=rates + rest,
         held=bounded.rates,
         limited=jnp.any(bounded.rates != rates + rest),
@@ -229,12 +229,6 @@ def _resolved(
     return task, rest, Bounded(rates, jnp.where(inside, 1.0, bounded.share))
 
 
-def _drift(robot: Robot, kin: Kinematics, momentum: Twist, end_effector: str | None, base_mode: str) -> Twist:
-    """Twist (6,) of the tool in I that the momentum gives it while the joints stand still: H* G."""
-    j_b, _ = jacobians(robot, kin, end_effector)
-    return j_b @ base_twist(robot, kin, jnp.zeros(robot.num_joints), momentum, base_mode)
-
-
 def _held_grid(position: Vector, rate: Vector, step: Scalar, tracker: Tracker) -> JointGrid:
     """The joints on the grid of the Runge-Kutta steps over which the rates are held."""
     points = 2 * tracker.integration_steps + 1
@@ -243,9 +237,7 @@ def _held_grid(position: Vector, rate: Vector, step: Scalar, tracker: Tracker) -
     return JointGrid(time, position + time[:, None] * rate, rates, jnp.zeros_like(rates))
 
 
-def _motion(
-    robot: Robot, seen: _Seen, rate: Vector, time: Array, step: Scalar, momentum: Twist, base_mode: str
-) -> Motion:
+def _motion(seen: _Seen, rate: Vector, time: Array, step: Scalar, momentum: Twist, base_mode: str) -> Motion:
     """The sampled motion and its joints at the samples and halfway between."""
     position, held = seen.moving.joint_position, seen.held[:-1]
     velocity = jnp.concatenate([held, held[-1:]])
@@ -263,13 +255,11 @@ def _motion(
         doubled(velocity),
         doubled(change),
     )
-    final = State(seen.moving.base_position[-1], seen.moving.base_quaternion[-1], position[-1])
-    last = base_twist(robot, kinematics(robot, final), held[-1], momentum, base_mode)
     return Motion(
         time=time,
         base_position=seen.moving.base_position,
         base_quaternion=seen.moving.base_quaternion,
-        base_twist=jnp.concatenate([seen.base_twist[:-1], last[None]]),
+        base_twist=jnp.concatenate([seen.base_twist[:-1], seen.arrival_twist[-1:]]),
         joint_position=position,
         joint_velocity=velocity,
         joint_acceleration=change,

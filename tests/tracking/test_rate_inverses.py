@@ -85,7 +85,7 @@ def test_filtered_inverse_and_its_derivative(compiled, case, kind):
         reference = lambda j: np.linalg.solve(j @ j.T + 0.05**2 * eye, j).T  # noqa: E731
     else:
         reference = partial(plain, largest=LAMBDA, epsilon=EPSILON)
-    # eigh of J J' leaves half of the digits of a zero singular value; what they are multiplied with is the gain's slope.
+    # eigh of J J' leaves half of the digits of a singular value at zero, where the gain's slope multiplies them.
     np.testing.assert_allclose(value, reference(jacobian), rtol=1e-9, atol=1e-9 / LAMBDA**2)
     expected = central(reference, jacobian, direction, 4e-5)
     np.testing.assert_allclose(slope, expected, rtol=2e-5, atol=2e-5 * np.abs(expected).max())
