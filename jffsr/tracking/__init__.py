@@ -1,0 +1,1 @@
+"""Tracking of Cartesian paths on the generalized Jacobian, and where a robot loses directions."""
