@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.comparison.profiles import SearchRun, performance_profiles, standings
-from experiments.comparison.searches import Search
+from experiments.comparison.searches import SEARCHES, Search
 
 TAUS = (1e-1, 1e-3, 1e-6)
 _FACTORS = np.logspace(0, 1.5, 201)
@@ -25,6 +25,7 @@ _COLOURS = {
     "memetic": "#d4a800",
 }
 _LINES = ("-", "--", ":")
+_PLACES = {search.label: place for place, search in enumerate(SEARCHES)}
 
 
 def tables(runs: list[SearchRun], facts: dict[str, Any]) -> str:
@@ -49,7 +50,9 @@ def _facts(facts: dict[str, Any]) -> str:
 
 
 def _searches(runs: list[SearchRun]) -> list[str]:
-    return list(dict.fromkeys(run.search for run in runs))
+    """Labels of the searches that ran, in the order of the list of all."""
+    found = dict.fromkeys(run.search for run in runs)
+    return sorted(found, key=lambda label: _PLACES.get(label, len(_PLACES)))
 
 
 def _wins(runs: list[SearchRun]) -> str:

@@ -15,11 +15,13 @@ from jffsr.planning.problem import Problem
 from jffsr.planning.search import search_of
 from jffsr.study.atomic import write_json
 from jffsr.study.building import build_problem, build_settings, build_tolerances
+from jffsr.study.claiming import Run, claim, shared_summary
 from jffsr.study.config import load_config
 from jffsr.study.dataset import plan_dataset, save_dataset
 from jffsr.study.robust_summary import robust_summary
 from jffsr.study.run_folder import RunFolder
 from jffsr.study.schema import PlanningConfig
+from jffsr.study.searching import kept_search
 from jffsr.study.summary import plan_summary
 
 
