@@ -9,9 +9,18 @@ from scipy.spatial.transform import Rotation
 _WEIGHTS = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 
 
-@jax.jit
+_SIZE = 512  # times of any number are padded to a multiple, so that few programs are compiled
+
+
 def sample(trajectory, times):
     """What a trajectory asks for at times (N,)."""
+    count = np.size(times)
+    padded = np.concatenate([times, np.full(-count % _SIZE, np.asarray(times)[-1])])
+    return jax.tree.map(lambda x: np.asarray(x)[:count], _sampled(trajectory, padded))
+
+
+@jax.jit
+def _sampled(trajectory, times):
     return jax.vmap(trajectory)(times)
 
 

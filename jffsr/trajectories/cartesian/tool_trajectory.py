@@ -38,13 +38,13 @@ class ToolTrajectory:
     timing: Timing
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "path", _as_node(self.path, 1.0))
+        object.__setattr__(self, "path", as_node(self.path, 1.0))
 
     @classmethod
     def from_callable(cls, pose_at: PoseFunction, duration: float) -> ToolTrajectory:
         """The trajectory of a function of time, s, in [0, duration] that gives position (3,), m, and quaternion."""
         duration = checked_duration(duration)
-        return cls(_InTime(_as_node(pose_at, float(duration)), duration), Uniform(duration))
+        return cls(_InTime(as_node(pose_at, float(duration)), duration), Uniform(duration))
 
     @property
     def duration(self) -> Array:
@@ -99,7 +99,7 @@ class _InTime:
         return self.pose_at(s * self.duration)
 
 
-def _as_node(function: PoseFunction, end: float) -> PoseFunction:
+def as_node(function: PoseFunction, end: float) -> PoseFunction:
     """The callable itself if it is a pytree with numbers, else wrapped as one without, its ends checked."""
     if not callable(function) or not jax.tree_util.all_leaves([function]):
         return function
