@@ -98,6 +98,7 @@ def redistributed(
     performed the largest share of the task is taken, and the task scaled (Flacco et al. 2012, algorithm 1).
     """
     n = jacobian.shape[1]
+    jacobian, lower, upper = jnp.asarray(jacobian), jnp.asarray(lower), jnp.asarray(upper)
     rank = _rank(jacobian)
 
     def one(carry, _):
@@ -110,13 +111,13 @@ def redistributed(
         other = other + (1 - free) * fixed
         inside = jnp.all((task + other >= lower) & (task + other <= upper))
         share, joint = task_share(task, other, lower, upper)
-        # Only rates that are inside at this share count; a first candidate always does, cut off if need be.
-        kept = jnp.all((other + share * task >= lower - _SLACK) & (other + share * task <= upper + _SLACK))
-        share = jnp.where(inside, 1.0, jnp.where(kept, share, -1.0))
-        better = (~done) & (share > best.share)
-        best = Bounded(
-            jnp.where(better, other + share * task, best.rates), jnp.where(better, share, best.share)
-        )
+        amount = jnp.where(inside, 1.0, share)
+        # Rates that are outside at any share count least; the first of them are taken, and cut off, if there are no
+        # others.
+        rates = other + amount * task
+        merit = jnp.where(jnp.all((rates >= lower - _SLACK) & (rates <= upper + _SLACK)), amount, -1.0)
+        better = (~done) & (merit > best.share)
+        best = Bounded(jnp.where(better, rates, best.rates), jnp.where(better, merit, best.share))
         reach = (task + other)[joint]
         bound = jnp.where(reach > upper[joint], upper[joint], lower[joint])
         chosen = jnp.arange(n) == joint

@@ -67,7 +67,7 @@ def track(
     duration = getattr(target, "duration", None) if duration is None else duration
     if duration is None:
         raise InputError("the target has no duration of its own: pass duration=, in seconds")
-    count = _samples(duration, tracker.period) if num_samples is None else check_steps(num_samples)
+    count = samples(duration, tracker.period) if num_samples is None else check_steps(num_samples)
     steps = count * tracker.substeps
     step = duration / steps
     if not isinstance(step, jax.core.Tracer):
@@ -83,7 +83,8 @@ def _pose(state: State) -> tuple:
     return state.base_position, state.base_quaternion, state.joint_position
 
 
-def _samples(duration: Scalar | float, period: float) -> int:
+def samples(duration: Scalar | float, period: float) -> int:
+    """How many periods a duration has, both in s; InputError where it is traced or no whole number of them."""
     if isinstance(duration, jax.core.Tracer):
         raise InputError("the duration is traced: pass num_samples=, how many samples it is cut into")
     share = float(duration) / period
