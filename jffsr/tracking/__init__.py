@@ -1,1 +1,1 @@
-"""Tracking of Cartesian paths on the generalized Jacobian, and where a robot loses directions."""
+"""A tool that follows a Cartesian path while the base floats: resolved rates on the generalized Jacobian."""
