@@ -82,6 +82,7 @@ _HOME = {
     "CoDesign": "jffsr.planning.codesign",
     "design_gradient": "jffsr.planning.codesign",
     "plan_pareto": "jffsr.planning.pareto",
+    "check_tracked": "jffsr.tracking.mujoco_check",
     "singularities": "jffsr.tracking.singularity.along",
     "SingularityReport": "jffsr.tracking.singularity.report",
     "singularity_scan": "jffsr.tracking.singularity.scan",
