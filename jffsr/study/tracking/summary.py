@@ -124,7 +124,8 @@ def summary_text(summary: dict[str, Any]) -> str:
     lines += [
         "",
         f"  finer re-run  tool {_scaled(check['tool_position_difference'], 1.0)} m, "
-        f"{_scaled(check['tool_attitude_difference'], 1.0)} rad; momentum drift {_scaled(check['momentum_drift'], 1.0)}",
+        f"{_scaled(check['tool_attitude_difference'], 1.0)} rad; momentum drift "
+        f"{_scaled(check['momentum_drift'], 1.0)}",
     ]
     if summary.get("singularities_text"):
         lines += ["", *(f"  {line}" for line in summary["singularities_text"].splitlines())]
