@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from jffsr.rollouts.motion import Motion
 from jffsr.tracking.singularity.along import singularities
 from jffsr.tracking.singularity.between import Postures
 from jffsr.tracking.singularity.nearest import Bounds
@@ -171,6 +173,27 @@ def test_rates_held_over_each_sample_are_followed_straight(planar):
         report = singularities(planar, motion, directions=PLANE, base_mode="fixed")
         assert abs(report.closest.time - 3.5) < 1e-6
         assert report.closest.crossing
+
+
+def test_a_motion_says_how_its_base_was_held_and_a_result_has_a_motion(planar):
+    at, plain = swing(41)
+    rows = len(plain.time)
+    motion = Motion(
+        time=plain.time,
+        base_position=np.zeros((rows, 3)),
+        base_quaternion=np.tile([1.0, 0, 0, 0], (rows, 1)),
+        base_twist=np.zeros((rows, 6)),
+        joint_position=plain.joint_position,
+        joint_velocity=plain.joint_velocity,
+        joint_acceleration=np.zeros((rows, 2)),
+        momentum=np.zeros(6),
+        joint_grid=None,
+        base_mode="fixed",
+    )
+    for given in (motion, SimpleNamespace(motion=motion)):
+        report = singularities(planar, given, directions=PLANE)
+        assert report.base_mode == "fixed"
+        assert abs(report.closest.time - brentq(lambda t: at(t)[1], 4.0, 6.0)) < 1e-6
 
 
 def test_a_motion_far_from_any_singularity_says_how_near_it_comes(planar):
