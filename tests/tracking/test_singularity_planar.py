@@ -232,6 +232,26 @@ def test_three_links_for_two_directions_lose_rank_only_fully_stretched(robots):
     np.testing.assert_allclose(point.posture_distance, np.hypot(0.1, 0.15), rtol=1e-6)
 
 
+def test_a_direction_that_is_never_had_is_one_stretch(robots):
+    """A planar arm never leaves its tilted plane: the determinant is rounding, whose sign says nothing."""
+    tilt = np.tile([np.cos(0.35), np.sin(0.35), 0.0, 0.0], (31, 1))
+    joints = np.array([0.5, 1.0, 0.7]) + np.linspace(0, 0.6, 31)[:, None]
+    report = singularities(
+        robots["ye_2019_planar3"],
+        Postures(np.linspace(0, 3, 31), joints, base_quaternion=tilt),
+        directions=("x", "y", "z"),
+        base_mode="fixed",
+    )
+    (interval,) = report.intervals
+    assert (interval.start, interval.end) == (0.0, 3.0)
+    assert len(interval.points) == 1
+    assert not interval.points[0].crossing
+    np.testing.assert_allclose(
+        np.abs(interval.points[0].lost_I[0]), [0, np.sin(0.7), np.cos(0.7), 0, 0, 0], atol=1e-9
+    )
+    assert interval.points[0].kind == "kinematic"
+
+
 def test_two_joints_for_three_directions_never_lose_rank(planar):
     report = singularities(
         planar,
