@@ -84,6 +84,7 @@ _HOME = {
     "plan_pareto": "jffsr.planning.pareto",
     "singularities": "jffsr.tracking.singularity.along",
     "SingularityReport": "jffsr.tracking.singularity.report",
+    "Postures": "jffsr.tracking.singularity.between",
     "singularity_scan": "jffsr.tracking.singularity.scan",
     "Settings": "jffsr.optimizers.registry",
     "composite_index": "jffsr.objectives.composite",
