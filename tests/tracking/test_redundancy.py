@@ -25,10 +25,10 @@ POSTURE = np.deg2rad([60.0, -60.0, 80.0, 45.0, -40.0, -50.0, 100.0])
 FOLLOW = Tracker(
     lambda_max=0.02,
     epsilon=0.02,
-    substeps=4,
+    substeps=5,
     feedforward="mean",
-    position_gain=14.0,
-    attitude_gain=14.0,
+    position_gain=18.0,
+    attitude_gain=18.0,
     limits="ignore",
 )
 TASKS = {
