@@ -64,7 +64,7 @@ def check_path(
     end_effector: str | None = None,
     base_mode: str = FLOATING,
 ) -> TrackingResult | None:
-    """What is surely wrong with tool positions (k, 3), m, at times (k,), s, before anything is tracked; else None.
+    """What is surely wrong with tool positions (k, 3), m, at times (k,), s, before any tracking; None if nothing.
 
     The path is out of reach of the system's centre of mass, which moves straight on, or begins inside the base's body;
     on a fixed base no point of it may lie there.
