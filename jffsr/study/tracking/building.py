@@ -171,7 +171,7 @@ def build_tracker(section: TrackerSection) -> Tracker:
 
 def _secondary(task: Secondary) -> SecondaryTask:
     if task.task == "base_attitude":
-        return BaseAttitudeHeld(task.gain, task.decoupled)
+        return BaseAttitudeHeld(task.gain, decoupled=task.decoupled)
     return {"joint_limits": JointLimitAvoidance, "manipulability": ManipulabilityGradient}[task.task](
         task.gain
     )
