@@ -41,10 +41,14 @@ def plan(
     """
     if isinstance(config, Problem):
         return solve(config, optimizer, settings, seed=seed)
-    if not isinstance(config, PlanningConfig):
+    if isinstance(config, str | os.PathLike):
         config = load_config(config, overrides)
     elif overrides:
         raise InputError("overrides go with a configuration's path or name, not with a loaded one")
+    if not isinstance(config, PlanningConfig):
+        raise InputError(
+            f"{config.where('kind')}: found '{config.kind}'; use 'jffsr run', or jffsr.track in Python"
+        )
     return _solve(config, build_problem(config))
 
 

@@ -18,10 +18,14 @@ from jffsr.dynamics.momentum import generalized_jacobian
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply, quaternion_to_rotation_vector
-from jffsr.tracking.damping import Damping
+from jffsr.spatial.safe import safe_norm
+from jffsr.tracking.damping import Damping, raised_cosine
 from jffsr.tracking.free_base import Response
 from jffsr.tracking.inverses import filtered_inverse, null_space
 from jffsr.types import Array, Matrix, Twist, Vector
+
+# A base that cannot turn has a map of zeros, which still needs some damping.
+_LEAST_TURN = 1e-12
 
 
 class Situation(NamedTuple):
@@ -102,10 +106,12 @@ class BaseAttitudeHeld:
     Nenchev, Umetani and Yoshida 1992.
 
     gain, 1/s, feeds back the rotation since the start; decoupled, static, solves for the base on its own and projects
-    the rates afterwards (Chiaverini 1997).
+    the rates afterwards (Chiaverini 1997). Directions in which the joints turn the base less than `share` of the
+    most are damped: a heavy base turns little, so that the tool's damping would be out of scale.
     """
 
     gain: Array | float = 0.0
+    share: Array | float = 0.02
     decoupled: bool = field(default=False, metadata={"static": True})
 
     def __call__(
@@ -117,8 +123,10 @@ class BaseAttitudeHeld:
         since = quaternion_multiply(s.state.base_quaternion, quaternion_conjugate(s.start.base_quaternion))
         wanted = -self.gain * quaternion_to_rotation_vector(since) - still
         inside = turn @ space
+        width = self.share * (safe_norm(turn.ravel()) + _LEAST_TURN)
+        own = raised_cosine(width, width)
         if self.decoupled:
-            added = space @ (filtered_inverse(turn, damping) @ wanted)
+            added = space @ (filtered_inverse(turn, own) @ wanted)
         else:
-            added = space @ (filtered_inverse(inside, damping) @ (wanted - turn @ rates))
-        return rates + added, space @ null_space(inside, damping)
+            added = space @ (filtered_inverse(inside, own) @ (wanted - turn @ rates))
+        return rates + added, space @ null_space(inside, own)

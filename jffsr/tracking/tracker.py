@@ -11,6 +11,8 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.reading.did_you_mean import hint
+from jffsr.robots.robot import REVOLUTE, Robot
+from jffsr.robots.state import State
 from jffsr.tracking.inverses import ADAPTIVE, METHODS
 from jffsr.tracking.limits import LIMIT_RULES, SCALE
 from jffsr.tracking.redundancy import SecondaryTask
@@ -100,3 +102,18 @@ def check_gains(tracker: Tracker, step: float) -> None:
                 f"tracker.{name} is {np.max(gain):g} 1/s, which is unstable with rates held over {step:g} s; "
                 f"it must be below {2 / step:g}"
             )
+
+
+def check_start(robot: Robot, state: State) -> None:
+    """InputError for a start outside the joints' limits, and for limits that contradict each other."""
+    limits, topology = robot.limits, robot.topology
+    parts = limits.position_lower, limits.position_upper, state.joint_position
+    if any(isinstance(x, jax.core.Tracer) for x in parts):
+        return
+    for name, kind, lower, upper, q in zip(topology.joint_names, topology.joint_types, *parts, strict=True):
+        scale, unit = (np.rad2deg(1.0), "deg") if kind == REVOLUTE else (1.0, "m")
+        box = f"[{lower * scale:g}, {upper * scale:g}] {unit}"
+        if lower > upper:
+            raise InputError(f"{name} has the limits {box}, which contradict each other")
+        if not lower <= q <= upper:
+            raise InputError(f"{name} starts at {float(q) * scale:g} {unit}, outside its limits of {box}")

@@ -23,7 +23,7 @@ from jffsr.tracking.limits import IGNORE, REDISTRIBUTE, Bounded, rate_bounds, re
 from jffsr.tracking.redundancy import Situation
 from jffsr.tracking.tool_task import mean_twist, pose_error, tracked_error, tracked_rows
 from jffsr.tracking.tracked import Tracked
-from jffsr.tracking.tracker import MEAN, Tracker, check_gains, check_tracker
+from jffsr.tracking.tracker import MEAN, Tracker, check_gains, check_start, check_tracker
 from jffsr.trajectories.cartesian.interface import ToolTarget
 from jffsr.types import Array, Quaternion, Scalar, Twist, Vector, Vector3
 
@@ -59,9 +59,12 @@ def track(
     s, defaults to the target's; it is cut into num_samples (static) samples, by default as many periods. Joint rates
     before the start are initial_state.joint_velocity, else zero, which the acceleration limit counts from. Everything
     but sizes and names is traced; put it under `jffsr.compiling.jit`. Raises InputError for what `check_tracker`
-    refuses, an unknown end effector or base_mode, and a duration that is no whole number of periods.
+    refuses, a start outside the joint limits that act, an unknown end effector or base_mode, and a duration that is no
+    whole number of periods.
     """
     check_tracker(tracker)
+    if tracker.limits != IGNORE:
+        check_start(robot, initial_state)
     base_freedom(base_mode)
     robot.end_effector_index(end_effector)
     duration = getattr(target, "duration", None) if duration is None else duration

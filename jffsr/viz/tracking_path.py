@@ -57,7 +57,9 @@ def draw_tool_path(runs: Runs, exaggeration: float | None = None) -> Figure:
     low, high = everything.min(axis=0) - pad, everything.max(axis=0) + pad
     planar = float(np.ptp(everything[:, 2])) < 1e-9 * extent
     if planar:
-        figure = new_figure(float(np.clip(WIDTH * (high - low)[1] / (high - low)[0], 1.2, 3.0)) + 0.75)
+        figure = new_figure(
+            float(np.clip((WIDTH - 0.6) * (high - low)[1] / (high - low)[0], 1.2, 3.0)) + 0.75
+        )
         axes = figure.subplots()
         frame_plane(axes, low, high)
     else:

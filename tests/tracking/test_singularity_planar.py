@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from jffsr.rollouts.motion import Motion
 from jffsr.tracking.singularity.along import singularities
 from jffsr.tracking.singularity.between import Postures
 from jffsr.tracking.singularity.nearest import Bounds
@@ -173,6 +175,27 @@ def test_rates_held_over_each_sample_are_followed_straight(planar):
         assert report.closest.crossing
 
 
+def test_a_motion_says_how_its_base_was_held_and_a_result_has_a_motion(planar):
+    at, plain = swing(41)
+    rows = len(plain.time)
+    motion = Motion(
+        time=plain.time,
+        base_position=np.zeros((rows, 3)),
+        base_quaternion=np.tile([1.0, 0, 0, 0], (rows, 1)),
+        base_twist=np.zeros((rows, 6)),
+        joint_position=plain.joint_position,
+        joint_velocity=plain.joint_velocity,
+        joint_acceleration=np.zeros((rows, 2)),
+        momentum=np.zeros(6),
+        joint_grid=None,
+        base_mode="fixed",
+    )
+    for given in (motion, SimpleNamespace(motion=motion)):
+        report = singularities(planar, given, directions=PLANE)
+        assert report.base_mode == "fixed"
+        assert abs(report.closest.time - brentq(lambda t: at(t)[1], 4.0, 6.0)) < 1e-6
+
+
 def test_a_motion_far_from_any_singularity_says_how_near_it_comes(planar):
     _, motion = swing(q2=(1.6, 1.2))
     report = singularities(planar, motion, directions=PLANE, base_mode="fixed")
@@ -207,6 +230,26 @@ def test_three_links_for_two_directions_lose_rank_only_fully_stretched(robots):
     assert report.determinant is None
     np.testing.assert_allclose(point.singular_posture, [0.7, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(point.posture_distance, np.hypot(0.1, 0.15), rtol=1e-6)
+
+
+def test_a_direction_that_is_never_had_is_one_stretch(robots):
+    """A planar arm never leaves its tilted plane: the determinant is rounding, whose sign says nothing."""
+    tilt = np.tile([np.cos(0.35), np.sin(0.35), 0.0, 0.0], (31, 1))
+    joints = np.array([0.5, 1.0, 0.7]) + np.linspace(0, 0.6, 31)[:, None]
+    report = singularities(
+        robots["ye_2019_planar3"],
+        Postures(np.linspace(0, 3, 31), joints, base_quaternion=tilt),
+        directions=("x", "y", "z"),
+        base_mode="fixed",
+    )
+    (interval,) = report.intervals
+    assert (interval.start, interval.end) == (0.0, 3.0)
+    assert len(interval.points) == 1
+    assert not interval.points[0].crossing
+    np.testing.assert_allclose(
+        np.abs(interval.points[0].lost_I[0]), [0, np.sin(0.7), np.cos(0.7), 0, 0, 0], atol=1e-9
+    )
+    assert interval.points[0].kind == "kinematic"
 
 
 def test_two_joints_for_three_directions_never_lose_rank(planar):

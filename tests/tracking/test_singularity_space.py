@@ -15,6 +15,7 @@ from jffsr.robots.state import State
 from jffsr.tracking.singularity.along import singularities
 from jffsr.tracking.singularity.between import Postures
 from jffsr.tracking.singularity.measures import many_jacobians
+from jffsr.tracking.singularity.nearest import Bounds, kind_of
 from jffsr.tracking.singularity.scan import singularity_scan
 from jffsr.tracking.singularity.task import make_task
 from jffsr.tracking.singularity.words import direction_in_words, joints_in_words
@@ -149,6 +150,16 @@ def test_words():
         "b +0.70, c -0.70",
         "c +0.70, b -0.70",
     )
+
+
+def test_kind_by_distance_and_direction():
+    bounds = Bounds(0.1, 0.2)
+    assert kind_of(0.0, 0.09, 0.99, bounds) == "kinematic"
+    assert kind_of(0.0, 0.09, 0.5, bounds) == "mixed"
+    assert kind_of(0.0, 0.15, 0.99, bounds) == "mixed"
+    assert kind_of(0.0, 0.21, 0.99, bounds) == "dynamic"
+    assert kind_of(0.0, np.inf, 0.0, bounds) == "dynamic"
+    assert kind_of(np.inf, 0.0, 1.0, bounds) == "mixed"
 
 
 def test_public_names():

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jffsr.dynamics.kinematics import end_effector_pose, kinematics
+from jffsr.dynamics.kinematics import end_effector_pose, kinematics, system_com
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import (
     matrix_to_quaternion,
@@ -41,6 +41,10 @@ def printed_quaternion(angles) -> jax.Array:
 
 def state_at(joints, position=(0.0, 0.0, 0.0), quaternion=(1.0, 0.0, 0.0, 0.0)) -> State:
     return State(np.array(position), np.array(quaternion), np.asarray(joints, dtype=float))
+
+
+def centre_of_mass(robot, state):
+    return system_com(robot, kinematics(robot, state))
 
 
 def tool_pose(robot, state):

@@ -77,6 +77,21 @@ def test_trapezoid_is_the_closed_form():
     np.testing.assert_allclose(acceleration[jnp.array([0, 2, 4, 6, 8])], [0, slope, 0, -slope, 0], atol=1e-16)
 
 
+def test_trapezoids_gradients_equal_differences_in_each_of_its_parts():
+    at = jax.jit(lambda d, r, t: jnp.stack(Trapezoid(d, r)(t)))
+    slopes = jax.jit(jax.jacfwd(lambda d, r, t: jnp.stack(Trapezoid(d, r)(t)), argnums=(0, 1)))
+    for time in (0.0, 1.1, 5.0, 9.2, 10.0):
+        found = slopes(10.0, 0.25, time)
+        assert np.all(np.isfinite(found))
+        for slope, step in zip(found, ((1e-6, 0.0), (0.0, 1e-6)), strict=True):
+            if 0 < time < 10:
+                ahead, behind = (
+                    at(10.0 + step[0], 0.25 + step[1], time),
+                    at(10.0 - step[0], 0.25 - step[1], time),
+                )
+                np.testing.assert_allclose(slope, (ahead - behind) / 2e-6, rtol=0, atol=1e-9)
+
+
 def test_quintic_rests_at_the_ends_and_beyond():
     s, rate, acceleration = jax.vmap(Quintic.over(4.0))(jnp.array([-1.0, 0.0, 2.0, 4.0, 5.0]))
     np.testing.assert_allclose(s, [0, 0, 0.5, 1, 1], rtol=0, atol=1e-15)

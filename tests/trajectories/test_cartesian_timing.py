@@ -149,6 +149,28 @@ def test_no_feasible_profile_is_faster():
         assert timing.duration < Tabulated.over(GRID, np.sqrt(best)).duration + 1e-5
 
 
+def test_random_paths_of_six_joints_are_gone_as_fast_as_the_linear_programme_says():
+    """Every limit held at both ends of each step to rounding; the duration within 1e-4 of the programme's."""
+    timed = jax.jit(lambda *x: fastest_timing(GRID, *x))
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        turns, phase, size, way = (rng.uniform(a, b, 6) for a, b in ((0, 8), (0, 6), (-2, 2), (-1, 1)))
+        slopes = size * turns * np.cos(turns * GRID[:, None] + phase) + way
+        bends = -size * turns**2 * np.sin(turns * GRID[:, None] + phase)
+        limits, rates = rng.uniform(0.2, 2, (2, 6))
+        bound = np.asarray(rate_bound(slopes, rates))
+        timing = timed(bound, slopes, bends, limits)
+        squares = np.asarray(timing.rates) ** 2
+        matrix, right = feasible(slopes, bends, limits)
+        assert np.max(matrix @ squares / right) < 1 + 1e-12
+        assert np.all(timing.rates <= bound * (1 + 1e-14))
+        best = linprog(
+            -np.ones(101), matrix, right, bounds=[(0, 0), *((0, x * x) for x in bound[1:-1]), (0, 0)]
+        ).x
+        ideal = Tabulated.over(GRID, np.sqrt(np.maximum(best, 0))).duration
+        np.testing.assert_allclose(timing.duration, ideal, rtol=1e-4)
+
+
 def test_limits_hold_between_the_places_of_the_grid():
     """At ten times as many times as steps, of the joints' closed form; to the second order of the step."""
     _, slopes, bends = joints(GRID)

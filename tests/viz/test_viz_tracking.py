@@ -89,7 +89,7 @@ def test_near_singular_stretches_and_instants_are_marked():
             marks = [line for line in axes.lines if line.get_gid() == "singular"]
             assert [line.get_xdata()[0] for line in marks] == [5.0]
         assert {"near singular", "least $\\sigma$"} <= set(legend_texts(figure))
-    plain = draw_pose_errors(replace(run, threshold=1e-9, singular_times=()))
+    plain = draw_pose_errors(replace(run, threshold=0.0, singular_times=()))
     assert legend_texts(plain) == ["x", "y", "z"]
     assert not shaded(plain.axes[0])
 

@@ -16,6 +16,7 @@ from jffsr.study.tracking.schema import TrackingConfig
 from jffsr.study.tracking.schema_path import ARC, CALL, LINE, SPLINE, TRAPEZOID, WAYPOINTS
 from jffsr.study.tracking.schema_tracker import Secondary
 from jffsr.study.tracking.schema_tracker import Tracker as TrackerSection
+from jffsr.tracking.indices import PathError, PublishedIndex
 from jffsr.tracking.redundancy import (
     BaseAttitudeHeld,
     JointLimitAvoidance,
@@ -24,6 +25,7 @@ from jffsr.tracking.redundancy import (
 )
 from jffsr.tracking.tool_task import rotation_between
 from jffsr.tracking.tracker import Tracker
+from jffsr.tracking.tuning import TuningProblem, tuning
 from jffsr.trajectories.cartesian.arc import Arc
 from jffsr.trajectories.cartesian.interface import ToolPath
 from jffsr.trajectories.cartesian.line import Line
@@ -169,7 +171,34 @@ def build_tracker(section: TrackerSection) -> Tracker:
 
 def _secondary(task: Secondary) -> SecondaryTask:
     if task.task == "base_attitude":
-        return BaseAttitudeHeld(task.gain, task.decoupled)
+        return BaseAttitudeHeld(task.gain, decoupled=task.decoupled)
     return {"joint_limits": JointLimitAvoidance, "manipulability": ManipulabilityGradient}[task.task](
         task.gain
     )
+
+
+def build_tuning(config: TrackingConfig, task: TrackingTask) -> TuningProblem:
+    """The search for numbers of the study's own tracker; InputError where they do not fit."""
+    wanted = config.tuning
+    limit = wanted.si("rate_limit")
+    if limit is None:
+        limit = np.asarray(task.robot.limits.velocity)
+    index = (
+        PublishedIndex(limit, wanted.weight)
+        if wanted.index == "published"
+        else PathError(limit, wanted.weight, wanted.radius)
+    )
+    try:
+        return tuning(
+            task.robot,
+            task.target,
+            task.initial_state,
+            build_tracker(config.tracker),
+            index,
+            wanted.parameters,
+            task.momentum,
+            end_effector=task.end_effector,
+            base_mode=task.base_mode,
+        )
+    except InputError as error:
+        raise InputError(f"{config.where('tuning.parameters')}: {error}") from None

@@ -128,7 +128,7 @@ def find_zero(function: Callable[[np.ndarray], np.ndarray], low: float, high: fl
         if place == 0:
             break
         low, high = times[place - 1], times[place]
-    return 0.5 * (low + high)
+    return float(0.5 * (low + high))
 
 
 def find_minimum(function: Callable[[np.ndarray], np.ndarray], low: float, high: float) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from jffsr.tracking.singularity.between import find_minimum, find_zero
 
@@ -41,7 +40,7 @@ def find_stretches(
     largest singular value. Every change of the determinant's sign is an instant of a stretch, however short.
     """
     values = smallest(times)
-    crossings = [] if determinant is None else _crossings(times, determinant)
+    crossings = [] if determinant is None else _crossings(times, values, determinant, _SHALLOW * scale)
     events = [Event(time, True) for time in crossings]
     events += [Event(time, False) for time in _minima(times, values, smallest, crossings, _SHALLOW * scale)]
     events.sort()
@@ -51,9 +50,11 @@ def find_stretches(
     return _stretches(times, values, smallest, deep, threshold), closest
 
 
-def _crossings(times: np.ndarray, determinant: Measure) -> list[float]:
+def _crossings(times: np.ndarray, values: np.ndarray, determinant: Measure, shallow: float) -> list[float]:
     negative = np.signbit(determinant(times))
-    places = np.flatnonzero(negative[1:] != negative[:-1])
+    # Where the task is never met, the determinant is rounding and its sign means nothing.
+    certain = np.maximum(values[1:], values[:-1]) > shallow
+    places = np.flatnonzero((negative[1:] != negative[:-1]) & certain)
     return [find_zero(determinant, times[i], times[i + 1]) for i in places]
 
 
@@ -61,16 +62,30 @@ def _minima(
     times: np.ndarray, values: np.ndarray, smallest: Measure, crossings: list[float], shallow: float
 ) -> list[float]:
     """Times of the minima that are no crossing; an end of the motion counts where it is lower than its neighbour."""
-    padded = np.concatenate([[np.inf], values, [np.inf]])
-    # Finite walls: the prominence of a peak between infinite ones is not a number that can be compared.
-    padded = np.minimum(padded, values.max() + 1 + abs(values.max()))
-    places = find_peaks(-padded, prominence=shallow)[0] - 1
     found = []
-    for place in places:
+    for place in _dips(values, shallow):
         low, high = times[max(place - 1, 0)], times[min(place + 1, len(times) - 1)]
         if not any(low <= crossing <= high for crossing in crossings):
             found.append(find_minimum(smallest, low, high) if high > low else float(low))
     return found
+
+
+def _dips(values: np.ndarray, shallow: float) -> list[int]:
+    """Places of the minima that rise by more than `shallow` on both sides, or on one at an end; at least one."""
+    found: list[int] = []
+    place, highest, falling = 0, -np.inf, True
+    for i, value in enumerate(values):
+        if falling:
+            if value < values[place]:
+                place = i
+            elif value > values[place] + shallow:
+                found.append(place)
+                highest, falling = value, False
+        elif value > highest:
+            highest = value
+        elif value < highest - shallow:
+            place, falling = i, True
+    return [*found, place] if falling else found
 
 
 def _stretches(

@@ -28,10 +28,8 @@ KINEMATIC, DYNAMIC, MIXED = "kinematic", "dynamic", "mixed"
 _LANES = 8
 _STEPS = 40
 _LONGEST = 0.25  # rad, of a step
-# A posture counts as singular when its condition number is beyond this.
-_SINGULAR = 1e-9
-# A singular value below this share of the largest is one of those that are lost where some are zero.
-_LOST = 1e-6
+# A singular value counts as zero below this many times the root of the rounding, as a share of the largest.
+_ZERO = 10.0
 # Lost directions agree when the cosine of the angle between them is at least this (26 degrees).
 _AGREE = 0.9
 
@@ -62,6 +60,10 @@ class Nearest(NamedTuple):
     generalized: SingularPosture
     fixed: SingularPosture
     alignment: Array
+
+
+def _is_zero(values: Vector) -> Array:
+    return values <= _ZERO * jnp.finfo(values.dtype).eps ** 0.5 * values[0]
 
 
 def _search(jacobian, start: Vector, scale: Vector) -> SingularPosture:
@@ -100,7 +102,7 @@ def _search(jacobian, start: Vector, scale: Vector) -> SingularPosture:
     left, values, _ = jnp.linalg.svd(jacobian(found), full_matrices=False)
     way = (found - start) / scale
     distance = jnp.sqrt(jnp.sum(way * way))
-    singular = values[-1] <= _SINGULAR * values[0]
+    singular = _is_zero(values)[-1]
     return SingularPosture(found, jnp.where(singular, distance, jnp.inf), left[:, -1])
 
 
@@ -115,7 +117,7 @@ def _nearest(robot, q, quaternion, end_effector, base_mode, task) -> Nearest:
         found = _search(jacobian, start, scale)
         left, values, _ = jnp.linalg.svd(jacobian(found.joint_position), full_matrices=False)
         # All that is lost there: two directions may go at once.
-        lost = values <= _LOST * values[0]
+        lost = _is_zero(values)
         return found.joint_position, (found, jnp.where(lost, left, 0.0))
 
     # One loop, hence one compiled search, for both.
