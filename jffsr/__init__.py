@@ -82,6 +82,7 @@ _HOME = {
     "CoDesign": "jffsr.planning.codesign",
     "design_gradient": "jffsr.planning.codesign",
     "plan_pareto": "jffsr.planning.pareto",
+    "check_tracked": "jffsr.tracking.mujoco_check",
     "track": "jffsr.tracking.tracking",
     "Tracker": "jffsr.tracking.tracker",
     "Tracked": "jffsr.tracking.tracked",
