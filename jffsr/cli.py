@@ -273,9 +273,9 @@ def _use_all_devices(arguments: argparse.Namespace) -> bool:
 
 def _check(arguments: argparse.Namespace) -> int:
     _prepare_jax()
-    from jffsr.study.reviewing import check_run
+    from jffsr.study.kinds import check_study
 
-    report = check_run(arguments.run)
+    report = check_study(arguments.run)
     print(report.to_text())
     return MET if report.passed else NOT_MET
 

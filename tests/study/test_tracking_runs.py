@@ -85,6 +85,15 @@ def test_a_finished_run_is_told_and_shown(compared, capsys):
     assert {"tool_path.png", "pose_errors.pdf", "singular_values.png", "tracked_joints.png"} <= figures
 
 
+def test_the_motion_is_made_again_in_mujoco(compared, capsys):
+    assert cli.main(["check", str(compared)]) == cli.MET
+    assert "MuJoCo reproduces the tracked motion" in capsys.readouterr().out
+    kept = json.loads((compared / "summary.json").read_text())["verification"]["mujoco"]
+    assert kept["passed"]
+    assert cli.main(["show", str(compared)]) == cli.MET
+    assert "simulators    MuJoCo reproduces" in capsys.readouterr().out
+
+
 def test_accuracy_that_is_asked_for_decides(tmp_path, capsys):
     """One tracker: the path is lost by the strong damping, and kept too fast by the weak one."""
     alone = ["accuracy.position=0.001"]
