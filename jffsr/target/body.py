@@ -90,7 +90,7 @@ class Target:
         marker: Frame = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),
         grasps: Mapping[str, Frame] | None = None,
     ) -> Target:
-        """The target that is this body, with its name and shapes; frames are given in the body's own frame, not in T."""
+        """The target that is this body, with its name and shapes; frames are given in the body's own frame."""
         com = to_array(body.com)
 
         def moved(frame: Frame) -> Frame:
@@ -107,12 +107,13 @@ class Target:
         if grasp not in self.grasp_names:
             names = ", ".join(self.grasp_names) or "none"
             raise InputError(
-                f"target '{self.name}': grasp '{grasp}' does not exist; there are: {names}{hint(str(grasp), self.grasp_names)}"
+                f"target '{self.name}': grasp '{grasp}' does not exist; there are: {names}"
+                f"{hint(str(grasp), self.grasp_names)}"
             )
         return self.grasp_names.index(grasp)
 
     def grasp_in_marker(self, grasp: str | None = None) -> Frame:
-        """A grasp frame in the marker's frame: origin (3,), m, and quaternion (4,); known without the centre of mass."""
+        """A grasp frame in the marker's: origin (3,), m, and quaternion (4,); it needs no centre of mass."""
         index = self.grasp_index(grasp)
         back = quaternion_conjugate(jnp.asarray(self.marker_quaternion))
         away = jnp.asarray(self.grasp_position[index] - self.marker_position)
@@ -123,7 +124,7 @@ def _frame(where: str, frame: Frame) -> Frame:
     position, quaternion = to_array(frame[0]), to_array(frame[1])
     if position.shape != (3,) or quaternion.shape != (4,):
         raise InputError(
-            f"{where}: shapes {position.shape} and {quaternion.shape}; a position (3,) and a quaternion (4,) are expected"
+            f"{where}: shapes {position.shape} and {quaternion.shape}; (3,) and (4,) are expected"
         )
     numbers = on_host(position)
     if numbers is not None and not np.all(np.isfinite(numbers[0])):

@@ -33,9 +33,9 @@ def test_an_inertia_that_no_body_has_is_refused_with_its_numbers():
 def test_frames_are_checked():
     with pytest.raises(InputError, match=r"grasp 'ring': shapes \(2,\)"):
         Target.create((1.0, 1.0, 1.0), grasps={"ring": ((0, 0), UNIT)})
-    with pytest.raises(InputError, match="marker: quaternion .* off unit length by 1"):
+    with pytest.raises(InputError, match=r"marker: quaternion .* off unit length by 1"):
         Target.create((1.0, 1.0, 1.0), marker=(REST, (2.0, 0, 0, 0)))
-    with pytest.raises(InputError, match="position .* is not finite"):
+    with pytest.raises(InputError, match=r"position .* is not finite"):
         Target.create((1.0, 1.0, 1.0), marker=((np.nan, 0, 0), UNIT))
     target = Target.create((1.0, 1.0, 1.0), grasps={"ring": (REST, UNIT)})
     with pytest.raises(InputError, match="grasp 'rign' does not exist; there are: ring; did you mean 'ring'"):
@@ -48,7 +48,7 @@ def test_states_are_checked_and_printed_quaternions_normalised():
     with pytest.warns(UserWarning, match="off unit length by 0.014"):
         state = TargetState.create(REST, REST, np.array([0.6, 0.8, 0, 0]) * 1.014, REST)
     np.testing.assert_allclose(state.quaternion, [0.6, 0.8, 0, 0], atol=1e-15)
-    with pytest.raises(InputError, match="velocity .* is not finite"):
+    with pytest.raises(InputError, match=r"velocity .* is not finite"):
         TargetState.create(REST, (np.inf, 0, 0), UNIT, REST)
     with pytest.raises(InputError, match=r"quaternion has shape \(3,\)"):
         TargetState.create(REST, REST, REST, REST)

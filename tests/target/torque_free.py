@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.integrate import quad
 from scipy.special import ellipj, ellipk
@@ -67,6 +69,4 @@ class EllipticRotation:
             return self.momentum * (h[a] * w[a] + h[b] * w[b]) / (h[a] ** 2 + h[b] ** 2)
 
         knots = np.append(np.arange(0, time, self.period / 4), time)
-        return sum(
-            quad(rate, x, y, epsabs=1e-13, epsrel=1e-13)[0] for x, y in zip(knots, knots[1:], strict=False)
-        )
+        return sum(quad(rate, x, y, epsabs=1e-13, epsrel=1e-13)[0] for x, y in pairwise(knots))
