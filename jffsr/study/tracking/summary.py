@@ -12,10 +12,12 @@ from jffsr.optimizers.driver import Outcome
 from jffsr.study.summary import versions
 from jffsr.study.tracking.building import TrackingTask
 from jffsr.study.tracking.schema import TrackingConfig
+from jffsr.tracking.outcome import TrackingCode
 
 if TYPE_CHECKING:
     from jffsr.study.tracking.running import TrackedPath
 
+_IMPOSSIBLE = (TrackingCode.UNREACHABLE, TrackingCode.THROUGH_BASE, TrackingCode.NOT_FINITE)
 _NUMBERS = ("lambda_max", "epsilon", "damping", "threshold", "position_gain", "attitude_gain")
 
 
@@ -33,7 +35,8 @@ def tracking_summary(
         "name": judged.result.code.name.lower(),
         "sentence": judged.result.sentence,
     }
-    if config.compare:
+    # A limit that is broken or a path that is lost is what a comparison is to show; a path that nobody can go is not.
+    if config.compare and not all(path.result.code in _IMPOSSIBLE for path in paths.values()):
         result = {"code": 0, "name": "compared", "sentence": f"{len(paths)} trackers compared on one path"}
     return {
         "kind": "tracking",
