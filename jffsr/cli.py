@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from jffsr.errors import InputError
 
 if TYPE_CHECKING:
-    from jffsr.study.planning import Run
+    from jffsr.study.claiming import Run
 
 MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None))
@@ -222,12 +222,11 @@ def _run(arguments: argparse.Namespace) -> int:
     _prepare_jax(config.precision)
     first = _use_all_devices(arguments)
     from jffsr.study.early import import_early
-    from jffsr.study.planning import run_planning
-    from jffsr.study.summary import summary_text
+    from jffsr.study.kinds import run_study, summary_text
 
     if first:
         import_early(config.output.figures)
-    run = run_planning(config, arguments.out, say=print if first else lambda text: None)
+    run = run_study(config, arguments.out, say=print if first else lambda text: None)
     if not first:
         return _status(run)
     if run.interrupted:
@@ -282,8 +281,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace) -> int:
     _prepare_jax()
+    from jffsr.study.kinds import summary_text
     from jffsr.study.run_folder import RunFolder
-    from jffsr.study.summary import summary_text
 
     summary = RunFolder(Path(arguments.run)).read_summary()
     if summary.get("kind") == "sweep":

@@ -9,10 +9,23 @@ from typing import Any
 import numpy as np
 
 from experiments.comparison.profiles import SearchRun, performance_profiles, standings
-from experiments.comparison.searches import Search
+from experiments.comparison.searches import SEARCHES, Search
 
 TAUS = (1e-1, 1e-3, 1e-6)
-_FACTORS = np.logspace(0, 2, 201)
+_FACTORS = np.logspace(0, 1.5, 201)
+_COLOURS = {
+    "QPSO": "#00204d",
+    "PSO": "#3d7ab8",
+    "GA": "#8a8a8a",
+    "DE": "#2e8b57",
+    "SSADE": "#9acd32",
+    "CMA-ES": "#7b3294",
+    "gradient": "#c2185b",
+    "hybrid": "#e8590c",
+    "memetic": "#d4a800",
+}
+_LINES = ("-", "--", ":")
+_PLACES = {search.label: place for place, search in enumerate(SEARCHES)}
 
 
 def tables(runs: list[SearchRun], facts: dict[str, Any]) -> str:
@@ -37,7 +50,9 @@ def _facts(facts: dict[str, Any]) -> str:
 
 
 def _searches(runs: list[SearchRun]) -> list[str]:
-    return list(dict.fromkeys(run.search for run in runs))
+    """Labels of the searches that ran, in the order of the list of all."""
+    found = dict.fromkeys(run.search for run in runs)
+    return sorted(found, key=lambda label: _PLACES.get(label, len(_PLACES)))
 
 
 def _wins(runs: list[SearchRun]) -> str:
@@ -90,21 +105,18 @@ def draw(path: Path, runs: list[SearchRun], searches: Sequence[Search]) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    labels = [search.label for search in searches if search.label in _searches(runs)]
-    colours = plt.get_cmap("cividis")(np.linspace(0, 0.95, len(labels)))
-    dashes = ["-", "--", ":", "-."]
+    shown = [search for search in searches if search.label in _searches(runs)]
+    # A colour for each family, a line for each of its members.
+    styles, members = {}, dict.fromkeys(_COLOURS, 0)
+    for search in shown:
+        family = next(family for family in _COLOURS if search.label.startswith(family))
+        styles[search.label] = {"color": _COLOURS[family], "linestyle": _LINES[members[family]]}
+        members[family] += 1
     figure, all_axes = plt.subplots(1, len(TAUS), figsize=(12, 4.2), sharey=True, layout="constrained")
     for axes, tau in zip(all_axes, TAUS, strict=True):
         profiles = performance_profiles(runs, tau, _FACTORS)
-        for k, label in enumerate(labels):
-            axes.step(
-                _FACTORS,
-                profiles[label],
-                where="post",
-                color=colours[k],
-                linestyle=dashes[k % 4],
-                label=label,
-            )
+        for label, style in styles.items():
+            axes.step(_FACTORS, profiles[label], where="post", label=label, **style)
         axes.set(xscale="log", xlim=(1, _FACTORS[-1]), ylim=(0, 1.02), title=f"to tau = {tau:g}")
         axes.set_xlabel("times the evaluations of the first to solve it")
         axes.grid(alpha=0.25)

@@ -65,11 +65,13 @@ class RealGA(PopulationOptimizer):
         children = jnp.concatenate([jnp.where(mated, first, one), jnp.where(mated, second, two)])
         children = children[: self.particles]
         # Random numbers are most of the cost: one that falls below the rate is, over the rate, uniform again.
-        draw, rate = uniforms(mutate, children.shape), jnp.minimum(self.mutations / children.shape[1], 1.0)
+        draw = jax.lax.optimization_barrier(uniforms(mutate, children.shape))
+        rate = jnp.minimum(self.mutations / children.shape[1], 1.0)
         mutated = draw < rate
         change = polynomial(
             jnp.where(mutated, draw / jnp.where(rate > 0, rate, 1.0), 0.5), self.mutation_index
         )
+        change = jax.lax.optimization_barrier(change)
         children = jnp.where(mutated, children + width * change, children)
         return jnp.clip(children, lower, upper), state.own
 
@@ -81,9 +83,10 @@ class RealGA(PopulationOptimizer):
             return low + places[0] * length, low + places[1] * length
         # Half of the numbers change sides, so that a child is not near the same parent in all of them. The first
         # digit of a draw says which, the others are a draw again.
-        draws = 2 * uniforms(key, one.shape)
+        # Barriers, since XLA would compute draws and logarithms once for each child: half of a generation's time.
+        draws = jax.lax.optimization_barrier(2 * uniforms(key, one.shape))
         swap = draws >= 1
-        factor = spread_factor(draws - swap, self.crossover_index)
+        factor = jax.lax.optimization_barrier(spread_factor(draws - swap, self.crossover_index))
         middle, half = (one + two) / 2, factor * (two - one) / 2
         half = jnp.where(swap, -half, half)
         return middle - half, middle + half

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jffsr.optimizers.hyperparameters import choice, flag, number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width, fraction_done
-from jffsr.optimizers.randoms import uniforms
+from jffsr.optimizers.randoms import uniform_pairs, uniforms
 from jffsr.types import Array, Scalar
 
 
@@ -74,7 +74,9 @@ class PSO(PopulationOptimizer):
         velocity, success = state.own
         inertia, cognitive, social = self.coefficients(generation, success)
         count, dimensions = state.position.shape
-        own, common = uniforms(key, (2, count, 1 if self.shared_draws else dimensions))
+        # Kept apart from what they are used in, so that no draw is computed twice.
+        draws = uniform_pairs(key, (count, 1 if self.shared_draws else dimensions))
+        own, common = jax.lax.optimization_barrier(draws)
         lower, upper, width = box_width(problem)
         velocity = (
             inertia * velocity

@@ -17,6 +17,16 @@ def uniforms(key: Array, shape: tuple[int, ...]) -> Array:
     return ((bits >> 9).astype(kind) + 0.5) * 2.0**-23
 
 
+def uniform_pairs(key: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """Two arrays of such numbers, at the cost of one in float64: JAX makes 64 bits at a time in any case."""
+    if jnp.zeros(()).dtype != jnp.float64:
+        one, other = jax.random.split(key)
+        return uniforms(one, shape), uniforms(other, shape)
+    bits = jax.random.bits(key, shape, dtype=jnp.uint64)
+    high, low = bits >> 32, bits & 0xFFFFFFFF
+    return tuple((half.astype(jnp.uint32).astype(float) + 0.5) * 2.0**-32 for half in (high, low))
+
+
 def distinct_others(key: Array, count: int, how_many: int) -> list[Array]:
     """For each of `count` members, indices (count,) of `how_many` others, all different from it and each other.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -12,12 +12,14 @@ from jffsr.reading.sources import Sources
 from jffsr.reading.values import UNION_SIGN
 from jffsr.reading.yaml_lines import Key, Mark
 
+_WRONG_KEY = "[key]"  # with which pydantic marks a key, not the value, of a mapping
+
 
 def complaint(error: ValidationError, model: type[BaseModel], sources: Sources) -> InputError:
     """The first error in the order of the files, and how many more there are."""
     problems = []
     for i, entry in enumerate(error.errors(include_url=False)):
-        key = tuple(str(part) for part in entry["loc"] if not str(part).startswith(UNION_SIGN))
+        key = tuple(str(part) for part in entry["loc"] if not str(part).startswith((UNION_SIGN, _WRONG_KEY)))
         if entry["type"] == "conflict" and entry["ctx"]["key"]:
             key += tuple(entry["ctx"]["key"].split("."))
         missing = entry["type"] == "missing"
@@ -83,14 +85,17 @@ def _advice(key: Key, model: type[BaseModel]) -> str:
 
 
 def _section(model: type[BaseModel], key: Key) -> type[BaseModel] | None:
-    """The section that the key leads to, through lists and unions."""
+    """The section that the key leads to, through lists, unions and mappings of sections."""
     here: type[BaseModel] | None = model
+    labelled = False
     for part in key:
         if here is None:
             return None
-        if part.isdecimal():
+        if part.isdecimal() or labelled:
+            labelled = False
             continue
         info = here.model_fields.get(part)
+        labelled = info is not None and get_origin(info.annotation) is dict
         here = _model_in(info.annotation) if info else None
     return here
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import os
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -31,7 +28,9 @@ from jffsr.robots.loading import load_robot
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.study.building_constraints import build_constraints
+from jffsr.study.calls import called_function
 from jffsr.study.joint_laws import build_trajectory
+from jffsr.study.robot_study import RobotStudy
 from jffsr.study.schema import PlanningConfig
 
 
@@ -58,7 +57,7 @@ def build_problem(config: PlanningConfig) -> Problem:
     return problem
 
 
-def build_robot(config: PlanningConfig) -> Robot:
+def build_robot(config: RobotStudy) -> Robot:
     """The robot with the limits that the study puts in place of its own."""
     try:
         robot = load_robot(config.robot)
@@ -171,23 +170,7 @@ def _further_terms(config: PlanningConfig, robot: Robot) -> Iterator[Term]:
 def _user_term(config: PlanningConfig, index: int) -> UserTerm:
     term = config.objective.terms[index]
     where = config.where(f"objective.terms.{index}.call")
-    module, _, name = term.call.rpartition(".")
-    # A console script does not search the folder it is called from, where a user's own module lies.
-    folder = os.getcwd()
-    added = folder not in sys.path
-    if added:
-        sys.path.insert(0, folder)
-    try:
-        function = getattr(importlib.import_module(module), name)
-    except Exception as error:
-        raise InputError(
-            f"{where}: '{term.call}' cannot be imported ({type(error).__name__}: {error})"
-        ) from None
-    finally:
-        if added:
-            sys.path.remove(folder)
-    if not callable(function):
-        raise InputError(f"{where}: '{term.call}' is not callable; a function of (robot, motion) is expected")
+    function = called_function(term.call, where, "(robot, motion)")
     with np.errstate(divide="ignore"):
         scale = np.float64(1.0) / np.float64(term.weight)
     return UserTerm(scale, function, term.label)

@@ -12,15 +12,20 @@ from pydantic import ValidationError
 
 from jffsr.errors import InputError
 from jffsr.reading.complaints import complaint
+from jffsr.reading.did_you_mean import hint, listed
 from jffsr.reading.sources import Sources
 from jffsr.study.composition import compose
 from jffsr.study.lookup import find_config
 from jffsr.study.schema import PlanningConfig
+from jffsr.study.tracking.schema import TrackingConfig
 
-KINDS = {"planning": PlanningConfig}
+Study = PlanningConfig | TrackingConfig
+KINDS: dict[str, type[Study]] = {"planning": PlanningConfig, "tracking": TrackingConfig}
+
+_KINDS = listed(f"'{kind}'" for kind in KINDS)
 
 
-def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] = ()) -> PlanningConfig:
+def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] = ()) -> Study:
     """The configuration of a study, given as a path or a name under `configs/`, with `a.b=value` overrides.
 
     Raises InputError: one sentence with the file and line (or the override), the key, what was found, and
@@ -30,15 +35,19 @@ def load_config(path_or_name: str | os.PathLike[str], overrides: Sequence[str] =
     return validated(*compose(path, overrides), path.stem)
 
 
-def validated(values: dict[str, Any], sources: Sources, stem: str) -> PlanningConfig:
+def validated(values: dict[str, Any], sources: Sources, stem: str) -> Study:
     """The configuration of a composed mapping, named after the stem where it has no name; raises InputError."""
     if values.get("name") is None:
         values["name"] = name_from(stem)
     if values.get("kind") is None:
-        raise InputError(f"{sources.where('kind')}: missing, 'kind: planning' is expected")
+        raise InputError(
+            f"{sources.where('kind')}: missing, {_KINDS} is expected, for example 'kind: planning'"
+        )
     kind = values["kind"]
-    # An unknown kind is told by the planning schema, which knows the allowed ones.
-    model = KINDS.get(kind, PlanningConfig) if isinstance(kind, str) else PlanningConfig
+    if not isinstance(kind, str) or kind not in KINDS:
+        near = hint(kind, KINDS) if isinstance(kind, str) else ""
+        raise InputError(f"{sources.where('kind')}: found {kind!r}, {_KINDS} is expected{near}")
+    model = KINDS[kind]
     try:
         config = model.model_validate(values)
     except ValidationError as error:
@@ -52,7 +61,7 @@ def name_from(stem: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]", "_", stem)[:100]
 
 
-def dump_config(config: PlanningConfig) -> str:
+def dump_config(config: Study) -> str:
     """The resolved configuration as YAML, every default written out; load_config reads it as an equal one."""
     return dump_values(config.model_dump())
 

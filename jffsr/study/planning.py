@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jax
-
 from jffsr.errors import InputError
-from jffsr.optimizers.constraints import split
-from jffsr.optimizers.driver import Snapshot
 from jffsr.optimizers.registry import Settings
-from jffsr.parallel.processes import any_process, first_does, is_first
+from jffsr.parallel.processes import is_first
 from jffsr.planning.plan import Plan, SearchInterrupted, solve
 from jffsr.planning.problem import Problem
 from jffsr.planning.search import search_of
 from jffsr.study.atomic import write_json
 from jffsr.study.building import build_problem, build_settings, build_tolerances
-from jffsr.study.checkpoint import load_checkpoint, save_checkpoint
+from jffsr.study.claiming import Run, claim, shared_summary
 from jffsr.study.config import load_config
 from jffsr.study.dataset import plan_dataset, save_dataset
-from jffsr.study.interrupt import Interrupt
-from jffsr.study.progress import progress_bar
 from jffsr.study.robust_summary import robust_summary
-from jffsr.study.run_folder import RunFolder, claim_run_folder
+from jffsr.study.run_folder import RunFolder
 from jffsr.study.schema import PlanningConfig
+from jffsr.study.searching import kept_search
 from jffsr.study.summary import plan_summary
 
 
@@ -48,10 +41,14 @@ def plan(
     """
     if isinstance(config, Problem):
         return solve(config, optimizer, settings, seed=seed)
-    if not isinstance(config, PlanningConfig):
+    if isinstance(config, str | os.PathLike):
         config = load_config(config, overrides)
     elif overrides:
         raise InputError("overrides go with a configuration's path or name, not with a loaded one")
+    if not isinstance(config, PlanningConfig):
+        raise InputError(
+            f"{config.where('kind')}: found '{config.kind}'; use 'jffsr run', or jffsr.track in Python"
+        )
     return _solve(config, build_problem(config))
 
 
@@ -71,16 +68,6 @@ def _solve(config: PlanningConfig, problem: Problem, **hooks: Any) -> Plan:
     )
 
 
-@dataclass(frozen=True)
-class Run:
-    """How a run in a folder ended: its folder, its summary, and whether it was only interrupted."""
-
-    folder: RunFolder
-    summary: dict[str, Any] | None
-    interrupted: bool = False
-    already_finished: bool = False
-
-
 def run_planning(
     config: PlanningConfig, out: str | Path | None, say: Callable[[str], None] = lambda text: None
 ) -> Run:
@@ -90,74 +77,30 @@ def run_planning(
     together only the first touches it.
     """
     problem = build_problem(config)
-    folder, finished, begun = _claim(config, out)
+    folder, finished, begun = claim(config, out)
     if finished:
-        return Run(folder, _summary(folder), already_finished=True)
+        return Run(folder, shared_summary(folder), already_finished=True)
     kind, settings = build_settings(config)
     phases, searched = search_of(problem, kind, settings)
-    resume = None
-    if begun:
-        resume = load_checkpoint(folder.checkpoint, phases, searched, jax.random.key(config.seed))
-        say(f"going on from {folder.checkpoint} ({resume.history[-1].evaluations} evaluations done)")
-    if is_first():
-        done = resume.history[-1] if resume else None
-        folder.keep_metrics(done.evaluations if done else 0, done.gradient_evaluations if done else 0)
-    show, close = progress_bar(phases, config.output.progress and is_first(), bool(problem.constraints))
-
-    def on_chunk(snapshot: Snapshot) -> None:
-        last = snapshot.history[-1]
-        if is_first():
-            folder.add_metrics(
-                phase=phases[snapshot.phase].name,
-                iteration=last.iteration,
-                evaluations=last.evaluations,
-                gradient_evaluations=last.gradient_evaluations,
-                **_best(problem, last.best_value, snapshot.state.progress.best_position.dtype),
-            )
-        save_checkpoint(folder.checkpoint, snapshot)
-        show(snapshot)
-
-    with Interrupt() as interrupted:
-        try:
-            found = _solve(
-                config,
-                problem,
-                resume=resume,
-                on_chunk=on_chunk,
-                interrupted=lambda: any_process(interrupted()),
-            )
-        except SearchInterrupted:
-            return Run(folder, None, interrupted=True)
-        finally:
-            close()
+    try:
+        with kept_search(
+            folder,
+            begun,
+            phases,
+            searched,
+            seed=config.seed,
+            progress=config.output.progress,
+            constrained=bool(problem.constraints),
+            say=say,
+        ) as hooks:
+            found = _solve(config, problem, **hooks)
+    except SearchInterrupted:
+        return Run(folder, None, interrupted=True)
     # Spread over the devices of all processes, and so a matter of all of them.
     robust = robust_summary(found, config.robust)
     if is_first():
         _finish(folder, config, found, [phase.name for phase in phases], robust)
-    return Run(folder, _summary(folder))
-
-
-def _best(problem: Problem, found: float, dtype: Any) -> dict[str, float]:
-    """The best index so far, and where there are constraints how far they are missed."""
-    if not problem.constraints:
-        return {"best_value": found}
-    value, violation = split(found, dtype)
-    return {"best_value": float(value), "violation": float(violation)}
-
-
-def _claim(config: PlanningConfig, out: str | Path | None) -> tuple[RunFolder, bool, bool]:
-    """The folder of the run, whether the run is finished, and whether it is begun."""
-
-    def claim() -> bytes:
-        folder = claim_run_folder(config, out)
-        return json.dumps([str(folder.path), folder.finished, folder.checkpoint.is_file()]).encode()
-
-    path, finished, begun = json.loads(first_does(claim))
-    return RunFolder(Path(path)), finished, begun
-
-
-def _summary(folder: RunFolder) -> dict[str, Any]:
-    return json.loads(first_does(lambda: json.dumps(folder.read_summary()).encode()))
+    return Run(folder, shared_summary(folder))
 
 
 def _finish(

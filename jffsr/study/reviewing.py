@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from jffsr.study.building import build_problem
 from jffsr.study.dataset import open_dataset
 from jffsr.study.run_folder import RunFolder
 
+if TYPE_CHECKING:
+    from jffsr.study.tracking.building import TrackingTask
+
 
 def open_run(path: str | Path) -> tuple[RunFolder, Problem, Any]:
     """The folder, the problem and the dataset of a finished run; InputError where something is missing."""
@@ -22,16 +25,31 @@ def open_run(path: str | Path) -> tuple[RunFolder, Problem, Any]:
     if not folder.path.is_dir():
         raise InputError(f"{path}: there is no such run folder")
     problem = build_problem(folder.read_config())
-    folder.read_summary()
-    try:
-        dataset = open_dataset(folder.result)
-        free = dataset["free_numbers"].to_numpy()
-    except Exception as error:
-        raise InputError(f"{folder.result}: cannot be read ({error})") from None
+    dataset = _open(folder, "free_numbers")
+    free = dataset["free_numbers"].to_numpy()
     lower, _ = problem.bounds()
     if free.shape != lower.shape or not np.all(np.isfinite(free)):
         raise InputError(f"{folder.result}: holds no plan of {folder.config} (free numbers {free.shape})")
     return folder, problem, dataset
+
+
+def open_tracking(path: str | Path) -> tuple[RunFolder, TrackingTask, Any]:
+    """The folder, the task and the dataset of a finished tracking run; InputError where something is missing."""
+    from jffsr.study.tracking.building import build_task
+
+    folder = RunFolder(Path(path))
+    return folder, build_task(folder.read_config()), _open(folder, "pose_error")
+
+
+def _open(folder: RunFolder, variable: str) -> Any:
+    """The dataset of a finished run, which holds this variable."""
+    folder.read_summary()
+    try:
+        dataset = open_dataset(folder.result)
+        dataset[variable].load()
+    except Exception as error:
+        raise InputError(f"{folder.result}: cannot be read ({error})") from None
+    return dataset
 
 
 def check_run(path: str | Path, steps: tuple[float, ...] = (2e-3, 1e-3)):

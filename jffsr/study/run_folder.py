@@ -12,8 +12,7 @@ from typing import Any
 
 from jffsr.errors import InputError
 from jffsr.study.atomic import plain, write_text
-from jffsr.study.config import dump_config, load_config
-from jffsr.study.schema import PlanningConfig
+from jffsr.study.config import Study, dump_config, load_config
 
 
 class RunFolder:
@@ -66,7 +65,7 @@ class RunFolder:
         except (OSError, ValueError) as error:
             raise InputError(f"{self.summary}: cannot be read ({error})") from None
 
-    def read_config(self) -> PlanningConfig:
+    def read_config(self) -> Study:
         """The resolved configuration of the run."""
         if not self.config.is_file():
             raise InputError(f"{self.path}: not a run folder (no config.yaml)")
@@ -93,7 +92,7 @@ class RunFolder:
             file.write(json.dumps(plain(values)) + "\n")
 
 
-def claim_run_folder(config: PlanningConfig, out: str | Path | None) -> RunFolder:
+def claim_run_folder(config: Study, out: str | Path | None) -> RunFolder:
     """The folder of this configuration's run: a new one, or the one to go on in.
 
     Without `out`, the first free of runs/NAME, runs/NAME-2, ... . InputError where `out` belongs to another

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import PrivateAttr, model_validator
+from pydantic import model_validator
 
 from jffsr.dynamics.base_mode import ATTITUDE_HELD, FIXED
-from jffsr.errors import InputError
-from jffsr.reading.section import Section
-from jffsr.reading.sources import Sources
 from jffsr.reading.values import choice, conflict, text, whole
+from jffsr.study.robot_study import NAME, RobotStudy
 from jffsr.study.schema_constraints import Constraints
 from jffsr.study.schema_objective import EFFORTS, TERMS, Objective
 from jffsr.study.schema_solver import Optimizer, Output, Robust, Rollout, Trajectory, Verification
 from jffsr.study.schema_task import Limits, Task
 
-NAME = r"(?!\.+\Z)[A-Za-z0-9_.-]{1,100}"  # also the name of a folder, so not . or ..
 
-
-class PlanningConfig(Section):
+class PlanningConfig(RobotStudy):
     """One planning study: plain values, validated; equal ones compare equal wherever they were written."""
 
     kind: Annotated[Literal["planning"], choice("planning")]
@@ -37,8 +33,6 @@ class PlanningConfig(Section):
     output: Output = Output()
     seed: Annotated[int, whole(0, 2**32 - 1)] = 0
     precision: Annotated[Literal["float64", "float32"], choice("float64", "float32")] = "float64"
-
-    _sources: Sources = PrivateAttr(default_factory=Sources)
 
     @model_validator(mode="after")
     def _check(self) -> PlanningConfig:
@@ -80,22 +74,3 @@ class PlanningConfig(Section):
     def enabled_terms(self) -> tuple[str, ...]:
         """Names of all terms that count, built-in ones first, in the order of the results."""
         return (*filter(self.term_enabled, TERMS), *(term.label for term in self.objective.terms))
-
-    def where(self, key: str) -> str:
-        """Place and key for a message: `configs/x.yaml:12: task.goal_deg`; of a default, its section's."""
-        return self._sources.where(key)
-
-    def per_joint(self, quantity: str, num_joints: int) -> tuple | None:
-        """The limit `position` ((low, high) each), `rate`, `acceleration` or `torque` of each joint; rad or m, s, N.
-
-        None when not given. Raises InputError when a list is given whose length is not the number of joints.
-        """
-        value = getattr(self.limits, f"{quantity}_si")
-        if value is None:
-            return None
-        if not isinstance(getattr(self.limits, self.limits.key_of(quantity)), tuple):
-            return (value,) * num_joints
-        if len(value) != num_joints:
-            where = self.where(f"limits.{self.limits.key_of(quantity)}")
-            raise InputError(f"{where}: found a list of {len(value)}, the robot has {num_joints} joints")
-        return value

@@ -67,10 +67,10 @@ Joints = Annotated[
 ]
 
 
-class Limits(Section):
-    """Limits that replace the robot's own; a limit that is not given is left as the robot has it."""
+class MotionLimits(Section):
+    """Limits of the joints that replace the robot's own; a limit that is not given is left as the robot has it."""
 
-    units: ClassVar = ("position", "rate", "acceleration", "base_excursion")
+    units: ClassVar = ("position", "rate", "acceleration")
 
     position_deg: Range | None = None
     position: Range | None = None
@@ -78,12 +78,9 @@ class Limits(Section):
     rate: Bound | None = None
     acceleration_deg: Bound | None = None
     acceleration: Bound | None = None
-    torque: Bound | None = None  # N m or N
-    base_excursion_deg: Excursion | None = None
-    base_excursion: Excursion | None = None
 
     @model_validator(mode="after")
-    def _check(self) -> Limits:
+    def _check(self) -> MotionLimits:
         self.check_units()
         return self
 
@@ -102,6 +99,21 @@ class Limits(Section):
     def acceleration_si(self) -> float | tuple[float, ...] | None:
         """One for all joints, or one per joint, rad/s^2 or m/s^2; None: the robot's own."""
         return self.si("acceleration")
+
+    @property
+    def torque_si(self) -> float | tuple[float, ...] | None:
+        """None: the robot's own."""
+        return None
+
+
+class Limits(MotionLimits):
+    """Limits of joints, torques and base that replace the robot's own."""
+
+    units: ClassVar = ("position", "rate", "acceleration", "base_excursion")
+
+    torque: Bound | None = None  # N m or N
+    base_excursion_deg: Excursion | None = None
+    base_excursion: Excursion | None = None
 
     @property
     def torque_si(self) -> float | tuple[float, ...] | None:

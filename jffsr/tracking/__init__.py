@@ -1,1 +1,1 @@
-"""A tool that follows a Cartesian path while the base floats: resolved rates on the generalized Jacobian."""
+"""Resolved-rate tracking of a tool's path, and where a robot loses directions on the way."""

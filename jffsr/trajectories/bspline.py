@@ -137,7 +137,7 @@ class ClampedBSpline:
         last = points.shape[0]
         slopes = _differences(points, p, knots, 1)
         bends = _differences(slopes, p - 1, knots, 2)
-        *_, low, middle, high = _basis(knots, p, s)
+        *_, low, middle, high = basis(knots, p, s)
         return (
             jnp.tensordot(points.T, high, 1),
             jnp.tensordot(slopes.T, middle[1:last], 1),
@@ -193,24 +193,26 @@ def _differences(points: Array, degree: int, knots: np.ndarray, first: int) -> A
     return degree * (points[1:] - points[:-1]) / span[:, None]
 
 
-def _basis(knots: np.ndarray, degree: int, s: Array) -> list[Array]:
+def basis(knots: np.ndarray | Array, degree: int, s: Array) -> list[Array]:
     """Basis functions of all degrees up to `degree`, (len(knots) - 1 - d, ...) each: Cox and de Boor's recursion.
 
-    Outside [0, 1], which rounding may reach, the first and the last piece go on.
+    Of clamped knots, NumPy's or traced, whose first and last span are not empty, at s of any shape. Outside [0, 1],
+    which rounding may reach, the first and the last piece go on.
     """
+    xp = np if isinstance(knots, np.ndarray) else jnp
 
-    def by_place(x: np.ndarray) -> np.ndarray:
+    def by_place(x: np.ndarray | Array) -> np.ndarray | Array:
         return x.reshape(x.shape + (1,) * s.ndim)
 
-    wide = np.flatnonzero(knots[:-1] < knots[1:])
-    begin, end = np.full(knots.size - 1, np.inf), np.full(knots.size - 1, -np.inf)
-    begin[wide], end[wide] = knots[wide], knots[wide + 1]
-    begin[wide[0]], end[wide[-1]] = -np.inf, np.inf
-    functions = [((by_place(begin) <= s) & (s < by_place(end))).astype(s.dtype)]
+    inside = knots[degree + 1 : knots.shape[0] - degree - 1]
+    empty, most = np.full(degree, np.inf), np.full(1, np.inf)
+    begin = by_place(xp.concatenate([empty, -most, inside, empty]))
+    end = by_place(xp.concatenate([-empty, inside, most, -empty]))
+    functions = [((begin <= s) & (s < end)).astype(s.dtype)]
     for d in range(1, degree + 1):
         span = knots[d:] - knots[:-d]
         # A function over knots that all coincide is zero, and so is its share.
-        inverse = np.divide(1.0, span, out=np.zeros_like(span), where=span > 0)
+        inverse = xp.where(span > 0, 1 / xp.where(span > 0, span, 1.0), 0.0)
         before = functions[-1]
         rising = (s - by_place(knots[: -d - 1])) * by_place(inverse[:-1]) * before[:-1]
         falling = (by_place(knots[d + 1 :]) - s) * by_place(inverse[1:]) * before[1:]

@@ -1,11 +1,13 @@
-"""The figures of a finished run, from its folder."""
+"""The figures of a finished run of any kind, from its folder."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from jffsr.study.reviewing import open_run
+from jffsr.study.reviewing import open_run, open_tracking
+from jffsr.study.run_folder import RunFolder
+from jffsr.study.tracking.schema import TrackingConfig
 from jffsr.viz.save import KINDS, save_figures
 
 
@@ -14,5 +16,12 @@ def draw_run(path: str | Path, kinds: Sequence[str] = KINDS) -> list[Path]:
 
     kinds are of "png" and "pdf".
     """
+    if isinstance(RunFolder(Path(path)).read_config(), TrackingConfig):
+        from jffsr.viz.tracking import save_tracking_figures
+        from jffsr.viz.tracking_runs import runs_of
+
+        folder, task, dataset = open_tracking(path)
+        times = folder.read_summary().get("singularities", {})
+        return save_tracking_figures(runs_of(dataset, task.robot, times), folder.figures, kinds)
     folder, problem, dataset = open_run(path)
     return save_figures(problem.robot, dataset, folder.figures, kinds)

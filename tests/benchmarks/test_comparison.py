@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from experiments import parametrisation
 from experiments.comparison.page import tables
 from experiments.comparison.scenarios import SCENARIOS
 from experiments.comparison.searches import MEMBERS, SEARCHES, STARTS
@@ -37,6 +38,13 @@ def test_a_scenario_is_a_problem_with_a_finite_box(scenario):
     lower, upper = scenario.problem().bounds()
     assert np.all(np.isfinite(lower))
     assert np.all(lower < upper)
+
+
+def test_laws_have_the_numbers_that_their_names_say():
+    for scenario in parametrisation.scenarios():
+        task, _, each_joint = scenario.name.split(", ")
+        free = len(scenario.problem().bounds()[0])
+        assert free == int(each_joint) * {"Hu torque": 2, "wu6 tight": 6}[task]
 
 
 def test_runs_are_read_as_they_were_kept_and_become_a_page(tmp_path):

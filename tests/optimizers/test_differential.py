@@ -17,7 +17,7 @@ from jffsr.errors import InputError
 from jffsr.optimizers.de import binomial, mutants
 from jffsr.optimizers.interface import FunctionProblem
 from jffsr.optimizers.population import PopulationState
-from jffsr.optimizers.randoms import distinct_others, uniforms
+from jffsr.optimizers.randoms import distinct_others, uniform_pairs, uniforms
 from jffsr.optimizers.registry import Settings, build_phases
 from jffsr.optimizers.ssade import SSADE, mean_distance
 
@@ -28,11 +28,14 @@ PROBLEM = FunctionProblem(LOWER[:3], UPPER[:3], sphere)
 @pytest.mark.parametrize("kind", [jnp.float32, jnp.float64])
 def test_uniforms_are_uniform_and_open(kind):
     with jax.enable_x64(kind == jnp.float64):
-        numbers = np.asarray(uniforms(KEY, (20_000,)))
-    assert numbers.dtype == kind
-    assert 0 < numbers.min() < 1e-3
-    assert 1 - 1e-3 < numbers.max() < 1
-    assert stats.kstest(numbers.astype(float), "uniform").pvalue > 0.01
+        alone = uniforms(KEY, (20_000,))
+        pair = uniform_pairs(KEY, (20_000,))
+    for numbers in map(np.asarray, (alone, *pair)):
+        assert numbers.dtype == kind
+        assert 0 < numbers.min() < 1e-3
+        assert 1 - 1e-3 < numbers.max() < 1
+        assert stats.kstest(numbers.astype(float), "uniform").pvalue > 0.01
+    assert stats.spearmanr(*pair).pvalue > 0.01
 
 
 def test_others_are_distinct_and_equally_likely():

@@ -95,18 +95,18 @@ def test_metrics_and_history_tell_index_and_violation_apart(finished):
 
 
 def test_an_interrupted_run_goes_on_to_the_same_bits(finished, config, tmp_path, monkeypatch):
-    from jffsr.study import planning
+    from jffsr.study import searching
 
     folder, _ = finished
     stopped = []
 
-    class After(planning.Interrupt):
+    class After(searching.Interrupt):
         def __call__(self):
             stopped.append(1)
             return len(stopped) == 6
 
     with monkeypatch.context() as patch:
-        patch.setattr(planning, "Interrupt", After)
+        patch.setattr(searching, "Interrupt", After)
         assert run_planning(config, tmp_path / "run").interrupted
     assert len((tmp_path / "run" / "metrics.jsonl").read_text().splitlines()) == 5
     run_planning(config, tmp_path / "run")

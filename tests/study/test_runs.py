@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from jffsr import cli
-from jffsr.study import planning
+from jffsr.study import searching
 from jffsr.study.dataset import open_dataset
 from jffsr.study.summary import summary_text
 
@@ -100,7 +100,7 @@ def test_a_finished_run_says_so_and_is_left_alone(finished, capsys):
 def test_interrupted_and_resumed_ends_with_the_same_bits(
     chunks_before_the_signal, finished, small, tmp_path, capsys, monkeypatch
 ):
-    save, count = planning.save_checkpoint, 0
+    save, count = searching.save_checkpoint, 0
 
     def save_then_signal(path, snapshot):
         nonlocal count
@@ -111,7 +111,7 @@ def test_interrupted_and_resumed_ends_with_the_same_bits(
 
     folder = tmp_path / "run"
     with monkeypatch.context() as patch:
-        patch.setattr(planning, "save_checkpoint", save_then_signal)
+        patch.setattr(searching, "save_checkpoint", save_then_signal)
         status, _, err = run(capsys, CONFIG, *small, "--out", str(folder))
     if (folder / "summary.json").exists():
         pytest.fail("the signal came too late to interrupt anything")

@@ -72,6 +72,11 @@ def expand(spec: Specification) -> list[Point]:
 def _config(spec: Specification, documents: list[Document], name: str) -> PlanningConfig:
     try:
         values, sources = compose_over(spec.base, spec.sources, [*spec.fixed, *documents])
-        return validated(values, sources, spec.stem)
+        config = validated(values, sources, spec.stem)
+        if not isinstance(config, PlanningConfig):
+            raise InputError(
+                f"{config.where('kind')}: found '{config.kind}', only planning studies are swept over"
+            )
+        return config
     except InputError as error:
         raise InputError(f"{error} ({name})") from None

@@ -1,0 +1,36 @@
+"""The kinds of study: how one is run, and how its summary reads; a new kind is a line in each table."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from jffsr.study.claiming import Run
+    from jffsr.study.config import Study
+
+_RUNNERS = {
+    "planning": "jffsr.study.planning:run_planning",
+    "tracking": "jffsr.study.tracking.running:run_tracking",
+}
+_TEXTS = {
+    "planning": "jffsr.study.summary:summary_text",
+    "tracking": "jffsr.study.tracking.summary:summary_text",
+}
+
+
+def run_study(config: Study, out: str | Path | None, say: Callable[[str], None] = lambda text: None) -> Run:
+    """Run a study of any kind in its folder; see `run_planning` and `run_tracking`."""
+    return _loaded(_RUNNERS[config.kind])(config, out, say=say)
+
+
+def summary_text(summary: dict[str, Any]) -> str:
+    """A summary of any kind for the terminal."""
+    return _loaded(_TEXTS[summary["kind"]])(summary)
+
+
+def _loaded(name: str) -> Callable:
+    module, _, function = name.partition(":")
+    return getattr(importlib.import_module(module), function)

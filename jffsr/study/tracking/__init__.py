@@ -1,0 +1,1 @@
+"""Tracking studies: the tool follows a path in space while the base floats."""
