@@ -180,7 +180,7 @@ def test_one_link_turns_its_base_as_the_closed_form_says():
 @pytest.fixture(scope="module")
 def planar(robots):
     """Paper 001's arm along an arc; the tracker, the momentum and, static, how the base is held are arguments."""
-    robot, start = robots["hu_2011_planar2"], wu_path.state_at([0.6, 0.5])
+    robot, start = robots["hu_2011_planar2"], wu_path.state_at([0.3, 1.4])
     position = np.asarray(wu_path.tool_pose(robot, start)[0])
     polar = np.linalg.norm(position), np.arctan2(position[1], position[0]), 0.1
     target = Arc(*(jnp.asarray(x) for x in polar))
@@ -194,10 +194,11 @@ def planar(robots):
 PLANAR = dataclasses.replace(EXACT, freedom="position", limits="ignore")
 
 
-def test_a_fixed_base_stands_still_and_the_tool_arrives(planar):
+def test_a_fixed_base_stands_still_and_the_tool_follows(planar):
     held = jit(lambda: planar(PLANAR, MOMENTUM, "fixed"))()
     np.testing.assert_array_equal(held.motion.base_position, np.zeros_like(held.motion.base_position))
-    assert float(pose_errors(held).position_end) < 1e-5
+    # The target is still moving, at 0.2 m/s: what is left is the curvature of a step of 0.05 s.
+    assert float(pose_errors(held).position_peak) < 2e-4
 
 
 def test_a_batch_of_trackers_and_momenta_is_each_of_them(planar):
