@@ -153,6 +153,7 @@ def wu(robots):
     return robots["wu_2018_6dof"]
 
 
+@pytest.mark.slow
 def test_a_free_roll_and_a_free_attitude_give_a_six_axis_arm_freedom(wu):
     """The directions that are tracked are kept, and those that are not are used."""
     state = wu_path.state_at(wu_path.START)

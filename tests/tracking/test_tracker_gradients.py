@@ -49,6 +49,7 @@ def planar(robots):
     return held, start, target
 
 
+@pytest.mark.slow
 def test_gradients_at_zero_singular_values_and_saturated_joints(planar):
     robot, start, target = planar
     fixed = Tracker(

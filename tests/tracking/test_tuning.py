@@ -44,6 +44,7 @@ def test_candidates_are_logarithms_of_positive_numbers(problem):
     assert np.all(lower < upper)
 
 
+@pytest.mark.slow
 def test_the_genetic_algorithm_betters_the_printed_pair(problem, value):
     printed = jnp.log(jnp.array([0.0571, 0.0677]))
     before, _ = value(problem, printed)
