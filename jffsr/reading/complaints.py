@@ -95,9 +95,13 @@ def _section(model: type[BaseModel], key: Key) -> type[BaseModel] | None:
             labelled = False
             continue
         info = here.model_fields.get(part)
-        labelled = info is not None and get_origin(info.annotation) is dict
+        labelled = info is not None and _is_mapping(info.annotation)
         here = _model_in(info.annotation) if info else None
     return here
+
+
+def _is_mapping(annotation: Any) -> bool:
+    return get_origin(annotation) is dict or any(map(_is_mapping, get_args(annotation)))
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -160,7 +160,12 @@ def outcome(
         )
         return TrackingResult(
             TrackingCode.LOST_PATH,
-            f"the path was lost: the tool is off by up to {errors}, allowed are {1e3 * tolerances.position:.4g} mm "
-            f"and {np.rad2deg(tolerances.attitude):.4g} deg; {bound}",
+            f"the path was lost: the tool is off by up to {errors}, allowed are {_allowed(tolerances)}; {bound}",
         )
-    return TrackingResult(TrackingCode.MET, f"the path is kept to {errors}, and every limit as well")
+    limits = ", and every limit as well" if np.isfinite(tolerances.limit) else "; limits were not looked at"
+    return TrackingResult(TrackingCode.MET, f"the path is kept to {errors}{limits}")
+
+
+def _allowed(tolerances: TrackingTolerances) -> str:
+    asked = ((1e3 * tolerances.position, "mm"), (np.rad2deg(tolerances.attitude), "deg"))
+    return " and ".join(f"{value:.4g} {unit}" for value, unit in asked if np.isfinite(value))

@@ -66,7 +66,7 @@ class TrackingConfig(RobotStudy):
     path: Path
     timing: Timing
     tracker: Tracker = Tracker()
-    compare: dict[Label, TrackerChange] = {}  # noqa: RUF012
+    compare: dict[Label, TrackerChange] | None = None
     tuning: Tuning | None = None
     accuracy: Accuracy = Accuracy()
     verification: TrackingVerification = TrackingVerification()
