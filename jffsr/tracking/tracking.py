@@ -209,8 +209,8 @@ def _resolved(
     damping = damping_for(
         tracker.method, jacobian, tracker.lambda_max, tracker.epsilon, tracker.damping, tracker.threshold
     )
-    task = rate_solution(tracker.method, jacobian, wanted, damping)
-    make_up = rate_solution(tracker.method, jacobian, -drift, damping)
+    # Together, so that the Jacobian is decomposed once.
+    task, make_up = rate_solution(tracker.method, jacobian, jnp.stack([wanted, -drift], axis=1), damping).T
     beside = jnp.zeros(s.robot.num_joints)
     if tracker.secondary:
         # The projector has the adaptive damping whatever the method: exact away from singularities, smooth in them.
