@@ -18,7 +18,7 @@ from jffsr.rollouts.motion import JointGrid, Motion
 from jffsr.rollouts.rollout import check_steps, rollout_grid
 from jffsr.tracking.damping import raised_cosine
 from jffsr.tracking.free_base import response
-from jffsr.tracking.inverses import TRANSPOSE, damping_for, null_space, rate_solution, singular_values
+from jffsr.tracking.inverses import TRANSPOSE, damping_for, null_space, rates_and_values
 from jffsr.tracking.limits import IGNORE, REDISTRIBUTE, Bounded, rate_bounds, redistributed, scaled
 from jffsr.tracking.redundancy import Situation
 from jffsr.tracking.tool_task import mean_twist, pose_error, tracked_error, tracked_rows
@@ -178,8 +178,7 @@ def _rates(
     off = tracked_error(tracker.freedom, position, quaternion, now.position, now.quaternion)
     wanted = tracked_rows(tracker.freedom, quaternion, velocity - gains * off)
     drift = tracked_rows(tracker.freedom, quaternion, s.response.drift)
-    rates, rest, bounded = _resolved(s, tracker, jacobian, wanted, drift, moving, step)
-    sigma = singular_values(jacobian)
+    rates, rest, bounded, sigma = _resolved(s, tracker, jacobian, wanted, drift, moving, step)
     return _Seen(
         moving=moving,
         base_twist=s.response.base_twist(bounded.rates),
@@ -204,13 +203,14 @@ def _resolved(
     drift: Vector,
     moving: _Moving,
     step: Scalar,
-) -> tuple[Vector, Vector, Bounded]:
-    """Rates (n,) of the task, the rates beside it, and what the limits make of both."""
+) -> tuple[Vector, Vector, Bounded, Vector]:
+    """Rates (n,) of the task, the rates beside it, what the limits make of both, and the singular values."""
     damping = damping_for(
         tracker.method, jacobian, tracker.lambda_max, tracker.epsilon, tracker.damping, tracker.threshold
     )
-    # Together, so that the Jacobian is decomposed once.
-    task, make_up = rate_solution(tracker.method, jacobian, jnp.stack([wanted, -drift], axis=1), damping).T
+    both = jnp.stack([wanted, -drift], axis=1)
+    found, sigma = rates_and_values(tracker.method, jacobian, both, damping)
+    task, make_up = found[:, 0], found[:, 1]
     beside = jnp.zeros(s.robot.num_joints)
     if tracker.secondary:
         # The projector has the adaptive damping whatever the method: exact away from singularities, smooth in them.
@@ -221,7 +221,7 @@ def _resolved(
         beside = total - task - make_up
     rest = make_up + beside
     if tracker.limits == IGNORE:
-        return task, rest, Bounded(task + rest, jnp.ones(()))
+        return task, rest, Bounded(task + rest, jnp.ones(())), sigma
     lower, upper = rate_bounds(s.robot.limits, s.state.joint_position, moving.joint_rate, step)
     if tracker.limits == REDISTRIBUTE and tracker.method != TRANSPOSE:
         bounded = redistributed(jacobian, wanted, drift, beside, lower, upper, damping)
@@ -230,7 +230,7 @@ def _resolved(
     inside = jnp.all((task + rest >= lower) & (task + rest <= upper))
     # Where nothing is limited the rates are those asked for, to the bit.
     rates = jnp.where(inside, task + rest, bounded.rates)
-    return task, rest, Bounded(rates, jnp.where(inside, 1.0, bounded.share))
+    return task, rest, Bounded(rates, jnp.where(inside, 1.0, bounded.share)), sigma
 
 
 def _held_grid(position: Vector, rate: Vector, step: Scalar, tracker: Tracker) -> JointGrid:
