@@ -86,6 +86,7 @@ _HOME = {
     "track": "jffsr.tracking.tracking",
     "Tracker": "jffsr.tracking.tracker",
     "Tracked": "jffsr.tracking.tracked",
+    "fastest_tracking": "jffsr.tracking.retiming",
     "verify_tracking": "jffsr.tracking.verification",
     "pose_errors": "jffsr.tracking.indices",
     "tuning": "jffsr.tracking.tuning",

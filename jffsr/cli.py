@@ -33,6 +33,7 @@ examples:
   jffsr run configs/planning/composite_wu6.yaml
   jffsr run composite_wu6 optimizer.particles=64 task.duration=25 --out runs/faster
   jffsr sweep composite_wu6 task.duration=20,25,30 seeds=20 --out runs/durations
+  jffsr run wu_2018
   jffsr check runs/composite_wu6
   jffsr robots wu_6dof
 
@@ -272,9 +273,9 @@ def _use_all_devices(arguments: argparse.Namespace) -> bool:
 
 def _check(arguments: argparse.Namespace) -> int:
     _prepare_jax()
-    from jffsr.study.reviewing import check_run
+    from jffsr.study.kinds import check_study
 
-    report = check_run(arguments.run)
+    report = check_study(arguments.run)
     print(report.to_text())
     return MET if report.passed else NOT_MET
 

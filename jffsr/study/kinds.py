@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jffsr.study.run_folder import RunFolder
+
 if TYPE_CHECKING:
     from jffsr.study.claiming import Run
     from jffsr.study.config import Study
@@ -19,6 +21,10 @@ _TEXTS = {
     "planning": "jffsr.study.summary:summary_text",
     "tracking": "jffsr.study.tracking.summary:summary_text",
 }
+_CHECKS = {
+    "planning": "jffsr.study.reviewing:check_run",
+    "tracking": "jffsr.study.tracking.reviewing:check_tracking",
+}
 
 
 def run_study(config: Study, out: str | Path | None, say: Callable[[str], None] = lambda text: None) -> Run:
@@ -29,6 +35,12 @@ def run_study(config: Study, out: str | Path | None, say: Callable[[str], None] 
 def summary_text(summary: dict[str, Any]) -> str:
     """A summary of any kind for the terminal."""
     return _loaded(_TEXTS[summary["kind"]])(summary)
+
+
+def check_study(path: str | Path) -> Any:
+    """Re-verify a finished run of any kind in other simulators; its report has `passed` and `to_text`."""
+    kind = RunFolder(Path(path)).read_config().kind
+    return _loaded(_CHECKS[kind])(path)
 
 
 def _loaded(name: str) -> Callable:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 def open_run(path: str | Path) -> tuple[RunFolder, Problem, Any]:
     """The folder, the problem and the dataset of a finished run; InputError where something is missing."""
     folder = RunFolder(Path(path))
-    if not folder.path.is_dir():
-        raise InputError(f"{path}: there is no such run folder")
     problem = build_problem(folder.read_config())
     dataset = _open(folder, "free_numbers")
     free = dataset["free_numbers"].to_numpy()

@@ -67,6 +67,8 @@ class RunFolder:
 
     def read_config(self) -> Study:
         """The resolved configuration of the run."""
+        if not self.path.is_dir():
+            raise InputError(f"{self.path}: there is no such run folder")
         if not self.config.is_file():
             raise InputError(f"{self.path}: not a run folder (no config.yaml)")
         return load_config(self.config)

@@ -68,7 +68,9 @@ def test_the_path_begins_where_the_tool_is_or_where_it_is_told():
         (["path.order=null"], "path.order: missing, poses with angles need an order such as 'ZYX'"),
         ([f"path.poses=[{GOAL}, {GOAL}, {GOAL}]"], "path.poses: found 3 poses, 2 are expected"),
         (["path.poses.0.quaternion=[1, 0, 0, 0]"], "found quaternion and angles, either "),
-        (["timing.kind=quintic"], "timing.ramp_fraction: the timing 'quintic' has no ramps, leave it out"),
+        (["timing.kind=quintic"], "timing.ramp_fraction: the timing 'quintic' has no such key, leave it out"),
+        (["timing.kind=fastest", "timing.ramp_fraction=null"], "'fastest' has no such key, leave it out"),
+        (["timing.duration=null"], "timing.duration: missing, a duration in s is required"),
         (["tuning={parameters: {lambda_mx: [1, 2]}, rate_limit: 1}"], "did you mean 'lambda_max'?"),
         (["tuning={parameters: {epsilon: [2, 1]}, rate_limit: 1}"], "found [2, 1], low < high is expected"),
         (["task.base_mode=fixed", "task.linear_momentum=[1, 0, 0]"], "base_mode 'fixed' does not keep it"),
@@ -119,6 +121,14 @@ def with_poses(start: str, goal: str = GOAL, order: str = "-xyz") -> list[str]:
         ),
         (["task.start_deg=[0, 0]"], "task.start_deg: found 2 numbers, robot 'wu_2018_6dof' has 6 joints"),
         (["limits.position_deg=100"], "lies outside its range"),
+        (
+            ["timing={kind: fastest, duration: null, ramp_fraction: null}", "task.linear_momentum=[1, 0, 0]"],
+            "timing.kind: found 'fastest', which needs zero momentum",
+        ),
+        (
+            ["timing={kind: fastest, duration: null, ramp_fraction: null}"],
+            "robot 'wu_2018_6dof' has joints without a rate limit",
+        ),
         (["task.end_effector=hand"], "task.end_effector: found 'hand', robot 'wu_2018_6dof' has tool"),
         (
             ["path.kind=call", "path.poses=null", "path.call=no_such.path"],

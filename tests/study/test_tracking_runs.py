@@ -85,6 +85,15 @@ def test_a_finished_run_is_told_and_shown(compared, capsys):
     assert {"tool_path.png", "pose_errors.pdf", "singular_values.png", "tracked_joints.png"} <= figures
 
 
+def test_the_motion_is_made_again_in_mujoco(compared, capsys):
+    assert cli.main(["check", str(compared)]) == cli.MET
+    assert "MuJoCo reproduces the tracked motion" in capsys.readouterr().out
+    kept = json.loads((compared / "summary.json").read_text())["verification"]["mujoco"]
+    assert kept["passed"]
+    assert cli.main(["show", str(compared)]) == cli.MET
+    assert "simulators    MuJoCo reproduces" in capsys.readouterr().out
+
+
 def test_accuracy_that_is_asked_for_decides(tmp_path, capsys):
     """One tracker: the path is lost by the strong damping, and kept too fast by the weak one."""
     alone = ["accuracy.position=0.001"]
@@ -92,6 +101,19 @@ def test_accuracy_that_is_asked_for_decides(tmp_path, capsys):
     assert "the path was lost" in capsys.readouterr().out
     assert run(tmp_path / "fast", *alone, "tracker.epsilon=0.01", "accuracy.rate_deg=0.5") == cli.NOT_MET
     assert "accuracy.rate_deg asks for 0.5 deg/s" in capsys.readouterr().out
+
+
+def test_a_path_through_the_base_is_no_success(tmp_path, capsys):
+    through = [
+        "path.poses.1={position: [0, 0, 0], angles: [-3.14, 0, -2.97]}",
+        "timing.duration=2",
+        "tracker.lambda_max=1",
+        "tracker.epsilon=3",
+    ]
+    for extra in ((), ("compare={one: {}, two: {lambda_max: 2}}",)):
+        folder = tmp_path / str(len(extra))
+        assert run(folder, *through, *extra) == cli.NOT_MET
+        assert "the path leads through the base's body" in capsys.readouterr().out
 
 
 @pytest.mark.slow

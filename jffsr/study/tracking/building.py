@@ -13,7 +13,7 @@ from jffsr.robots.state import State
 from jffsr.study.building import build_robot
 from jffsr.study.calls import called_function
 from jffsr.study.tracking.schema import TrackingConfig
-from jffsr.study.tracking.schema_path import ARC, CALL, LINE, SPLINE, TRAPEZOID, WAYPOINTS
+from jffsr.study.tracking.schema_path import ARC, CALL, FASTEST, LINE, QUINTIC, SPLINE, WAYPOINTS
 from jffsr.study.tracking.schema_tracker import Secondary
 from jffsr.study.tracking.schema_tracker import Tracker as TrackerSection
 from jffsr.tracking.indices import PathError, PublishedIndex
@@ -23,6 +23,7 @@ from jffsr.tracking.redundancy import (
     ManipulabilityGradient,
     SecondaryTask,
 )
+from jffsr.tracking.retiming import fastest_tracking, stretched
 from jffsr.tracking.tool_task import rotation_between
 from jffsr.tracking.tracker import Tracker
 from jffsr.tracking.tuning import TuningProblem, tuning
@@ -31,6 +32,7 @@ from jffsr.trajectories.cartesian.interface import ToolPath
 from jffsr.trajectories.cartesian.line import Line
 from jffsr.trajectories.cartesian.pose_spline import PoseSpline
 from jffsr.trajectories.cartesian.poses import checked_pose
+from jffsr.trajectories.cartesian.tabulated import Tabulated
 from jffsr.trajectories.cartesian.timing import Quintic, Trapezoid
 from jffsr.trajectories.cartesian.tool_trajectory import ToolTrajectory
 from jffsr.trajectories.cartesian.waypoints import Waypoints
@@ -55,20 +57,38 @@ def build_task(config: TrackingConfig) -> TrackingTask:
     start = _start(config, robot)
     end_effector = _end_effector(config, robot)
     path = build_path(config, _tool_pose(robot, start, end_effector))
-    timing = config.timing
-    law = (
-        Trapezoid.over(timing.duration, timing.ramp_fraction)
-        if timing.kind == TRAPEZOID
-        else Quintic.over(timing.duration)
-    )
-    return TrackingTask(
-        robot,
-        ToolTrajectory(path, law),
-        start,
-        np.array(config.task.momentum),
-        end_effector,
-        config.task.base_mode,
-    )
+    momentum, base_mode = np.array(config.task.momentum), config.task.base_mode
+    if config.timing.kind == FASTEST:
+        law = _fastest(config, robot, path, start, end_effector)
+    elif config.timing.kind == QUINTIC:
+        law = Quintic.over(config.timing.duration)
+    else:
+        law = Trapezoid.over(config.timing.duration, config.timing.ramp_fraction)
+    return TrackingTask(robot, ToolTrajectory(path, law), start, momentum, end_effector, base_mode)
+
+
+def _fastest(
+    config: TrackingConfig, robot: Robot, path: ToolPath, start: State, end_effector: str
+) -> Tabulated:
+    if any(config.task.momentum):
+        raise InputError(
+            f"{config.where('timing.kind')}: found 'fastest', which needs zero momentum; 'trapezoid' or 'quintic' is "
+            "expected"
+        )
+    tracker = build_tracker(config.tracker)
+    try:
+        timing = fastest_tracking(
+            robot,
+            path,
+            start,
+            tracker,
+            config.timing.margin,
+            end_effector=end_effector,
+            base_mode=config.task.base_mode,
+        )
+    except InputError as error:
+        raise InputError(f"{config.where('timing.kind')}: {error}") from None
+    return stretched(timing, tracker.period)
 
 
 def _start(config: TrackingConfig, robot: Robot) -> State:

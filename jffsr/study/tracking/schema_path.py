@@ -160,25 +160,38 @@ class Path(Section):
             )
 
 
-TRAPEZOID, QUINTIC = "trapezoid", "quintic"
+TRAPEZOID, QUINTIC, FASTEST = "trapezoid", "quintic", "fastest"
+_OF_TIMING = {  # the keys that each kind of timing knows, with their defaults; None is required
+    TRAPEZOID: {"duration": None, "ramp_fraction": 0.2},
+    QUINTIC: {"duration": None},
+    FASTEST: {"margin": 0.02},
+}
 
 
 class Timing(Section):
-    """How the tool goes along its path."""
+    """How the tool goes along its path; `fastest`: as the robot's limits of rate and acceleration allow."""
 
-    kind: Annotated[Literal["trapezoid", "quintic"], choice(TRAPEZOID, QUINTIC)] = TRAPEZOID
-    duration: Seconds
+    kind: Annotated[Literal["trapezoid", "quintic", "fastest"], choice(TRAPEZOID, QUINTIC, FASTEST)] = (
+        TRAPEZOID
+    )
+    duration: Seconds | None = None
     ramp_fraction: Annotated[float, number(gt=0, le=0.5)] | None = None  # trapezoid
+    margin: Annotated[float, number(ge=0, lt=1)] | None = None  # fastest: share of the limits that is spared
 
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        if isinstance(value, dict) and value.get("kind", TRAPEZOID) == TRAPEZOID:
-            return {**value, "ramp_fraction": value.get("ramp_fraction") or 0.2}
-        return value
+        if not isinstance(value, dict) or not isinstance(value.get("kind", TRAPEZOID), str):
+            return value
+        own = _OF_TIMING.get(value.get("kind", TRAPEZOID), {})
+        return {**value, **{key: default for key, default in own.items() if value.get(key) is None}}
 
     @model_validator(mode="after")
     def _check(self) -> Timing:
-        if self.kind != TRAPEZOID and self.ramp_fraction is not None:
-            raise conflict(f"the timing '{self.kind}' has no ramps, leave it out", "ramp_fraction")
+        own = _OF_TIMING[self.kind]
+        if "duration" in own and self.duration is None:
+            raise conflict("missing, a duration in s is required", "duration")
+        for key in ("duration", "ramp_fraction", "margin"):
+            if key not in own and getattr(self, key) is not None:
+                raise conflict(f"the timing '{self.kind}' has no such key, leave it out", key)
         return self
