@@ -28,13 +28,16 @@ from jffsr.tracking.free_base import response
 from jffsr.tracking.inverses import ADAPTIVE, inverse_and_values, rates_and_values
 from jffsr.tracking.tracking import _held_grid
 
+CHUNK = 64
+"""States at a time on a core, so that what they work on stays near it; trackers, whose need is known, are left to
+`map_batch`."""
 ALONE = 16
 """Trackers, or states, that are done one after another; the time of each is the same."""
 
 
-def _over_batch(one, batch) -> Program:
+def _over_batch(one, batch, chunk: int | None = None) -> Program:
     """The results of all candidates in one call, over all devices."""
-    return called(lambda candidates: jffsr.map_batch(one, candidates), batch)
+    return called(lambda candidates: jffsr.map_batch(one, candidates, chunk=chunk), batch)
 
 
 def trackers(case: TrackingCase) -> Program:
@@ -94,12 +97,12 @@ def jacobians(case: TrackingCase) -> Program:
         kin = jffsr.kinematics(robot, jffsr.State(jnp.zeros(3), quaternion, q))
         return response(robot, kin, jnp.zeros(6), None, FLOATING).jacobian
 
-    return _over_batch(one, case.postures)
+    return _over_batch(one, case.postures, CHUNK)
 
 
 def steps(case: TrackingCase) -> Program:
     """Joints, base pose and singular values (K, n + 13) of one step."""
-    return _over_batch(_step(case), case.postures)
+    return _over_batch(_step(case), case.postures, CHUNK)
 
 
 def steps_alone(case: TrackingCase) -> Program:
@@ -128,7 +131,7 @@ def _step(case: TrackingCase):
 def decompositions(case: TrackingCase) -> Program:
     """Damped inverses and singular values of J*, as the tracker has them."""
     damping = raised_cosine(LARGEST, EPSILON)
-    return _over_batch(lambda jacobian: _flat(*inverse_and_values(jacobian, damping)), _matrices(case))
+    return _over_batch(lambda jacobian: _flat(*inverse_and_values(jacobian, damping)), _matrices(case), CHUNK)
 
 
 def decompositions_lapack(case: TrackingCase) -> Program:
@@ -139,7 +142,7 @@ def decompositions_lapack(case: TrackingCase) -> Program:
         lamb = jnp.where(sigma < EPSILON, 0.5 * LARGEST * (1 + jnp.cos(jnp.pi * sigma / EPSILON)), 0.0)
         return _flat((vh.T * (sigma / (sigma**2 + lamb**2))) @ u.T, sigma)
 
-    return _over_batch(one, _matrices(case))
+    return _over_batch(one, _matrices(case), CHUNK)
 
 
 def _flat(inverse, sigma):
