@@ -54,7 +54,7 @@ def rates_followed(robot, target, start, rates, duration, momentum, end_effector
 errors_linearised = partial(jit, static_argnames=("freedom", "end_effector"))(sensitivity)
 
 
-def refine(
+def refine_tracking(
     robot: Robot,
     target: Any,
     tracked: Tracked,

@@ -15,7 +15,7 @@ from jffsr.errors import InputError
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import rotation_vector_to_quaternion
 from jffsr.tracking.between_samples import errors_between
-from jffsr.tracking.refinement import errors_linearised, rates_followed, refine
+from jffsr.tracking.refinement import errors_linearised, rates_followed, refine_tracking
 from jffsr.tracking.retimed import Retimed
 from jffsr.tracking.tool_task import ALL
 from jffsr.tracking.tracker import Tracker
@@ -59,7 +59,7 @@ def limit(tracked):
 
 @pytest.fixture(scope="module")
 def refined(wu, path, tracked, limit):
-    return refine(wu, path, tracked, rate_limit=limit, iterations=12, **SCALES)
+    return refine_tracking(wu, path, tracked, rate_limit=limit, iterations=12, **SCALES)
 
 
 def largest(error, position_scale, attitude_scale):
@@ -118,7 +118,7 @@ def test_the_error_falls_at_the_same_peak_rate(path, tracked, refined, limit):
 
 
 def test_the_pace_may_be_refined_as_well(wu, tracked, path, limit):
-    found = refine(wu, path, tracked, rate_limit=limit, retime=True, iterations=6, **SCALES)
+    found = refine_tracking(wu, path, tracked, rate_limit=limit, retime=True, iterations=6, **SCALES)
     own = np.asarray(found.target.own_time)
     assert own[0] == 0
     assert own[-1] == DURATION
@@ -138,14 +138,14 @@ def test_twist_of_a_retimed_target_is_its_velocity(path):
 
 
 def test_limits_of_acceleration_and_position_are_kept(wu, path, tracked, limit):
-    free = refine(wu, path, tracked, rate_limit=limit, iterations=6, **SCALES).tracked.motion
+    free = refine_tracking(wu, path, tracked, rate_limit=limit, iterations=6, **SCALES).tracked.motion
     high = np.asarray(free.joint_position).max(0)
     upper = NEAR + 0.5 * (high - NEAR) + 1e-3
     held = replace(wu, limits=replace(wu.limits, position_upper=upper))
     # From rest, the first change of the given motion is larger than the limit.
     change = np.asarray(tracked.motion.joint_acceleration)
     most = 0.5 * np.abs(change).max()
-    found = refine(
+    found = refine_tracking(
         held, path, tracked, rate_limit=limit, acceleration_limit=most, iterations=6, **SCALES
     ).tracked.motion
     assert np.max(np.asarray(free.joint_position) - upper) > 0.01
@@ -183,7 +183,7 @@ def test_least_largest_error_of_a_turn_that_is_too_fast(robots):
     rest = jit(lambda r: track_rates(robot, TurnTarget(), start, r, 7.0, base_mode="fixed"))(
         jnp.full((7, 2), 0.5 * rate)
     )
-    found = refine(
+    found = refine_tracking(
         robot, TurnTarget(), rest, rate_limit=rate, position_scale=1e6, attitude_scale=1.0, iterations=12
     )
     x, t = ANGLES, np.arange(8.0)
@@ -201,7 +201,7 @@ def test_away_from_singularities_nothing_is_left_at_the_samples(wu):
     )
     tracker = Tracker(lambda_max=0.0571, epsilon=0.0677)
     tracked = jit(lambda p: track(wu, p, start, tracker, num_samples=SAMPLES))(path)
-    found = refine(wu, path, tracked, **SCALES)
+    found = refine_tracking(wu, path, tracked, **SCALES)
     assert found.worst[0] > 0.1
     assert np.max(np.abs(found.tracked.pose_error)) < 1e-9
 
@@ -218,10 +218,10 @@ def test_errors_between_samples_are_those_of_more_samples(wu, path, tracked):
 
 def test_what_is_refused(wu, path, tracked):
     with pytest.raises(InputError, match="rate_limit is -1; it must be positive"):
-        refine(wu, path, tracked, rate_limit=-1.0)
+        refine_tracking(wu, path, tracked, rate_limit=-1.0)
     with pytest.raises(InputError, match="position_scale is 0; it must be positive and finite"):
-        refine(wu, path, tracked, position_scale=0.0)
+        refine_tracking(wu, path, tracked, position_scale=0.0)
     with pytest.raises(InputError, match="freedom is 'roll'; allowed are all, roll_free, position"):
-        refine(wu, path, tracked, freedom="roll")
+        refine_tracking(wu, path, tracked, freedom="roll")
     with pytest.raises(InputError, match=r"rates have the shape \(5, 2\); \(K, 6\)"):
         track_rates(wu, path, wu_path.state_at(NEAR), np.zeros((5, 2)), 1.0)
