@@ -60,12 +60,13 @@ def measured() -> dict[str, Any]:
         limit = RATE_LIMIT_DEG if duration == DURATIONS[0] else rate_limit(tracked)
         searches[duration] = search(case, duration, limit)
         target = case.target(duration)
-        equal[duration] = {"adaptive, searched": searches[duration]["measured"]}
-        for peak in (searches[duration]["measured"].peak, reference.peak):
-            damped = damped_at_peak(case, duration, peak)
-            name = f"damped, lambda {float(damped.damping):.4f}"
-            equal[duration][name] = measure(case, target, follow(case, target, damped))
-        equal[duration]["adaptive, printed pair"] = reference
+        equal[duration] = {}
+        for name, measurement in (("printed", reference), ("searched", searches[duration]["measured"])):
+            damped = damped_at_peak(case, duration, measurement.peak)
+            equal[duration][f"adaptive, {name} pair"] = measurement
+            equal[duration][f"damped, lambda {float(damped.damping):.4f}"] = measure(
+                case, target, follow(case, target, damped)
+            )
         done(f"search, {duration:g} s")
         gained[duration] = freedoms(case, duration, reference, every=duration == DURATIONS[0])
         done(f"freedoms, {duration:g} s")
@@ -75,7 +76,7 @@ def measured() -> dict[str, Any]:
     curves = front(case, first, reference, rates)
     done("front")
     peaks = {duration: runs[duration, "zero", "adaptive"][1].peak for duration in DURATIONS}
-    found = {
+    return {
         "robot": case.robot,
         "runs": runs,
         "searches": searches,
@@ -90,7 +91,6 @@ def measured() -> dict[str, Any]:
             **{f"needed_{d:g}": time_needed(exact, peaks[d]) for d in DURATIONS},
         },
     }
-    return jax.tree.map(lambda x: np.asarray(x) if isinstance(x, jax.Array) else x, found)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.wu_2018.front import PAIRS
 from jffsr.viz.save import save_figure
 from jffsr.viz.style import legend_above, line_look, new_figure, styled
 from jffsr.viz.tracked_run import tracked_run
@@ -57,7 +58,9 @@ def _errors(runs: Mapping) -> Figure:
                 axes.plot(found.time, factor * found.errors[:, index], **line_look(look), label=method)
             axes.axhline(0, color="0.7", linewidth=0.5, zorder=0)
             axes.set_xlim(0, duration)
-            axes.set_title(f"{'xyz'[index % 3]} [{'mm' if index < 3 else 'deg'}], {duration:g} s", pad=2)
+            direction = "xyz"[index % 3]
+            words = f"{direction} [mm]" if index < 3 else f"about {direction} [deg]"
+            axes.set_title(f"{words}, {duration:g} s", pad=2)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     legend_above(figure, panels[0, 0].lines[:2], ["damped", "adaptive"])
@@ -82,30 +85,37 @@ def _generations(searches: Mapping[float, Mapping]) -> Figure:
 
 @styled
 def _winner(rows: Mapping[float, list]) -> Figure:
-    """Position and attitude error over time of the freedoms at one duration, in logarithms."""
+    """Position and attitude error over time, the largest while a rate is held, in logarithms."""
     figure = new_figure(4.0, _WIDE)
     panels = figure.subplots(2, len(rows), sharey="row", sharex="col", squeeze=False)
     shown = ("none", "rates", "posture", "posture and feedback", "posture, feedback and rates")
     for column, (duration, found) in enumerate(rows.items()):
         chosen = {row.freedom: row.measured for row in found if row.freedom in shown}
         for look, (name, measured) in enumerate(chosen.items()):
-            position = 1e3 * np.linalg.norm(measured.errors[:, :3], axis=1)
-            attitude = np.rad2deg(np.linalg.norm(measured.errors[:, 3:], axis=1))
+            position, attitude = (_envelope(measured.errors[:, part]) for part in (slice(0, 3), slice(3, 6)))
+            time = np.linspace(0, duration, len(position) + 1)
             label = "published method" if name == "none" else name
-            panels[0, column].semilogy(
-                measured.time, np.maximum(position, 1e-5), **line_look(look), label=label
-            )
-            panels[1, column].semilogy(measured.time, np.maximum(attitude, 1e-7), **line_look(look))
+            for axes, curve in zip(panels[:, column], (1e3 * position, np.rad2deg(attitude)), strict=True):
+                axes.stairs(curve, time, baseline=None, **line_look(look), label=label)
+                axes.set_yscale("log")
         panels[0, column].set_title(f"{duration:g} s, all within {found[0].measured.peak:.2f} deg/s")
-        panels[0, column].set_ylim(1e-4, 30)
-        panels[1, column].set_ylim(1e-6, 5)
+        panels[0, column].set_ylim(1e-2, 30)
+        panels[1, column].set_ylim(2e-5, 5)
         panels[1, column].set_xlim(0, duration)
         panels[1, column].set_xlabel("time [s]")
     panels[0, 0].set_ylabel("position error [mm]")
     panels[1, 0].set_ylabel("attitude error [deg]")
     figure.align_ylabels()
-    legend_above(figure, panels[0, 0].lines, [line.get_label() for line in panels[0, 0].lines])
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    legend_above(figure, handles, labels)
     return figure
+
+
+def _envelope(errors: np.ndarray) -> np.ndarray:
+    """The largest length of errors (8 K + 1, 3) while each of the K rates is held."""
+    size = np.linalg.norm(errors, axis=1)
+    inside = size[:-1].reshape(-1, 8)
+    return np.maximum(inside.max(axis=1), size[8::8])
 
 
 @styled
@@ -114,7 +124,10 @@ def _front(curves: Mapping[str, np.ndarray], peak: float) -> Figure:
     figure = new_figure(3.2, 5.0)
     axes = figure.subplots()
     for look, (name, (peaks, errors)) in enumerate(curves.items()):
-        marker = {} if look == 0 else {"marker": "o", "markersize": 2.5}
+        marker = {"marker": "o", "markersize": 2.5}
+        if name == PAIRS:
+            axes.semilogy(peaks, errors, ".", color="0.6", markersize=2, label=name, zorder=1)
+            continue
         axes.semilogy(peaks, np.maximum(errors, 1e-4), **line_look(look), **marker, label=name)
     axes.plot([peak], [1.0], linestyle="none", marker="*", markersize=7, color="black", label="printed pair")
     axes.axhline(0.1, color="0.6", linewidth=0.6, zorder=0)

@@ -21,6 +21,7 @@ def tables(found: Mapping[str, Any]) -> str:
         _postures(found["postures"]),
         *(_freedoms(duration, rows) for duration, rows in found["freedoms"].items()),
         _pace(found["pace"]),
+        _tenth(found["freedoms"]),
     ]
     return "\n\n".join(parts)
 
@@ -227,3 +228,17 @@ def _pace(pace: Mapping[str, float]) -> str:
         f"{pace['peak_25']:.2f} deg/s it needs {pace['needed_25']:.1f} s, at {pace['peak_15']:.2f} deg/s "
         f"{pace['needed_15']:.1f} s, however it is timed."
     )
+
+
+def _tenth(freedoms: Mapping[float, Sequence[Any]]) -> str:
+    """Whether the last motion of each duration has less than a tenth of the error and no higher peak rate."""
+    lines = []
+    for duration, rows in freedoms.items():
+        reference, found = rows[0].measured, rows[-1].measured
+        share = found.over(reference)
+        reached = share < 0.1 and found.peak <= reference.peak
+        lines.append(
+            f"{duration:g} s: {100 * share:.2g} % of the error at {found.peak:.3f} against {reference.peak:.3f} deg/s; "
+            f"less than a tenth is {'reached' if reached else 'not reached'}."
+        )
+    return " ".join(lines)
