@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-optimised check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -70,6 +70,13 @@ bench-optimizers:  ## time a generation of each optimizer against evosax and pyg
 	    "$(BENCH_VENV)/bin/python" -m pip install --quiet --no-input --disable-pip-version-check) \
 	    pygmo -c constraints.txt || echo "pygmo could not be installed; the table leaves it out." >&2
 	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks.optimizers $(if $(QUICK),--quick --out runs/benchmarks/optimizers.md)
+
+bench-tracking:  ## time a thousand trackers, and a tracking step against Pinocchio (QUICK=1: fewer)
+	@$(MAKE) --no-print-directory venv VENV="$(BENCH_VENV)"
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(BENCH_VENV)/bin/python",\
+	    "$(BENCH_VENV)/bin/python" -m pip install --quiet --no-input --disable-pip-version-check) \
+	    pin cmeel-eigen -c constraints.txt || echo "Pinocchio could not be installed; the table says so." >&2
+	"$(BENCH_VENV)/bin/python" -m experiments.benchmarks.tracking $(if $(QUICK),--quick --out runs/benchmarks/tracking.md)
 
 check-distributed: $(STAMP)  ## check that several processes search as one, also after a kill
 	$(VENV_PYTHON) -m pytest -m distributed $(PYTEST_ARGS)

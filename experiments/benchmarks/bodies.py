@@ -32,7 +32,7 @@ class Bodies:
 def turned_bodies(robot) -> Bodies:
     """The bodies of a robot whose joints all turn."""
     assert robot.topology.is_revolute.all(), "the native opponents know turning joints only"
-    turn = [np.eye(3), *(_z_along(np.asarray(axis, float)) for axis in robot.joint_axis)]
+    turn = [np.eye(3), *(z_along(np.asarray(axis, float)) for axis in robot.joint_axis)]
     parents = robot.topology.parents
     rotation = [
         turn[p].T @ np.asarray(robot.joint_rotation[i], float) @ turn[i + 1] for i, p in enumerate(parents)
@@ -56,7 +56,7 @@ def plain_urdf(robot) -> str:
     return jffsr.to_urdf(robot.replace(limits=replace(robot.limits, acceleration=unlimited)))
 
 
-def _z_along(axis: np.ndarray) -> np.ndarray:
+def z_along(axis: np.ndarray) -> np.ndarray:
     """A rotation matrix whose third column is this unit vector."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     x = np.cross(helper, axis)

@@ -40,9 +40,7 @@ def validated(values: dict[str, Any], sources: Sources, stem: str) -> Study:
     if values.get("name") is None:
         values["name"] = name_from(stem)
     if values.get("kind") is None:
-        raise InputError(
-            f"{sources.where('kind')}: missing, {_KINDS} is expected, for example 'kind: planning'"
-        )
+        raise InputError(f"{sources.where('kind')}: missing, {_KINDS} is expected")
     kind = values["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
         near = hint(kind, KINDS) if isinstance(kind, str) else ""

@@ -103,12 +103,17 @@ def summary_text(summary: dict[str, Any]) -> str:
         lines.append(f"  constraint    {name} missed by {missed} (allowed {allowed})")
     lines += sensitivity_lines(summary.get("sensitivity"))
     lines += robust_lines(summary.get("robust"))
-    crosscheck = check.get("mujoco")
-    if crosscheck:
-        lines.append(f"  simulators    {crosscheck['sentence']}")
-    seconds = summary["seconds"]
-    lines.append(f"  seconds       {seconds['total']:.1f} in all, {seconds['compile']:.1f} of them compiling")
-    return "\n".join(lines)
+    return "\n".join(lines + last_lines(summary))
+
+
+def last_lines(summary: dict[str, Any]) -> list[str]:
+    """What the simulators said, where they were asked, and how long it took: of studies of any kind."""
+    crosscheck, seconds = summary["verification"].get("mujoco"), summary["seconds"]
+    lines = [f"  simulators    {crosscheck['sentence']}"] if crosscheck else []
+    return [
+        *lines,
+        f"  seconds       {seconds['total']:.1f} in all, {seconds['compile']:.1f} of them compiling",
+    ]
 
 
 def _number(value: float | None) -> str:

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.tracking.damping import Damping, constant, damping_of, gain, gain_difference, raised_cosine
+from jffsr.tracking.jacobi_rotations import in_descending_order, singular_bases
 from jffsr.types import Array, Matrix, Scalar, Vector
 
 INVERSE, DAMPED, MANIPULABILITY, ADAPTIVE, TRANSPOSE = (
@@ -29,34 +30,35 @@ RANK_CUT = 1e-12
 
 
 @jax.custom_jvp
+def inverse_and_values(jacobian: Matrix, damping: Damping) -> tuple[Matrix, Vector]:
+    """`filtered_inverse` and `singular_values` of a matrix (m, n) by one decomposition."""
+    u, sigma, v = singular_bases(jacobian)
+    kept = _kept(sigma, damping)
+    value = (v * jnp.where(kept, gain(jnp.where(kept, sigma, 1.0), damping), 0.0)) @ u.T
+    return value, in_descending_order(sigma)
+
+
 def filtered_inverse(jacobian: Matrix, damping: Damping) -> Matrix:
     """V g(Sigma) U' (n, m) of a matrix (m, n), with g(s) = s/(s^2 + lambda(s)^2), zero for undamped zero values.
 
     Without damping it is the Moore-Penrose inverse. Its derivative is right and finite at repeated singular values
     and, where there is damping, at zero ones; first derivatives only.
     """
-    return _filtered(*_decomposed(jacobian), damping)
-
-
-def _decomposed(jacobian: Matrix) -> tuple[Matrix, Vector, Matrix]:
-    u, sigma, vh = jnp.linalg.svd(jacobian, full_matrices=False)
-    return u, sigma, vh.T
+    return inverse_and_values(jacobian, damping)[0]
 
 
 def _kept(sigma: Vector, damping: Damping) -> Array:
     """Which singular values are answered: all that are damped, and of the others those above rounding."""
-    return (sigma > RANK_CUT * sigma[0]) | (damping_of(sigma, damping) > RANK_CUT * sigma[0])
+    rounding = RANK_CUT * jnp.max(sigma)
+    return (sigma > rounding) | (damping_of(sigma, damping) > rounding)
 
 
-def _filtered(u: Matrix, sigma: Vector, v: Matrix, damping: Damping) -> Matrix:
-    kept = _kept(sigma, damping)
-    return (v * jnp.where(kept, gain(jnp.where(kept, sigma, 1.0), damping), 0.0)) @ u.T
-
-
-@filtered_inverse.defjvp
-def _filtered_inverse_jvp(primals, tangents):
+@inverse_and_values.defjvp
+def _inverse_and_values_jvp(primals, tangents):
     (jacobian, damping), (jacobian_dot, damping_dot) = primals, tangents
-    u, sigma, v = _decomposed(jacobian)
+    # Whole bases, also where a singular value is zero.
+    u, sigma, vh = jnp.linalg.svd(jacobian, full_matrices=False)
+    v = vh.T
     kept = _kept(sigma, damping)
     safe = jnp.where(kept, sigma, 1.0)
     value = jnp.where(kept, gain(safe, damping), 0.0)
@@ -80,12 +82,20 @@ def _filtered_inverse_jvp(primals, tangents):
     outside = (u * ratio) @ (u.T @ right) + ((left @ v) * ratio) @ v.T
     _, value_dot = jax.jvp(lambda d: gain(safe, d), (damping,), (damping_dot,))
     change = (u * jnp.where(kept, value_dot, 0.0)) @ v.T
-    return (v * value) @ u.T, (u @ core @ v.T + outside + change).T
+    found = (v * value) @ u.T, sigma
+    return found, ((u @ core @ v.T + outside + change).T, jnp.diagonal(inner))
 
 
+@jax.custom_jvp
 def singular_values(jacobian: Matrix) -> Vector:
     """Singular values (min(m, n),) of a matrix, largest first; their derivative is finite where two are equal."""
-    return jnp.linalg.svd(jacobian, compute_uv=False)
+    return in_descending_order(singular_bases(jacobian)[1])
+
+
+@singular_values.defjvp
+def _singular_values_jvp(primals, tangents):
+    u, sigma, vh = jnp.linalg.svd(primals[0], full_matrices=False)
+    return sigma, jnp.einsum("ik,ij,kj->k", u, tangents[0], vh)
 
 
 def manipulability(jacobian: Matrix) -> Scalar:
@@ -128,10 +138,19 @@ def damping_for(
     return constant(0.0)
 
 
-def rate_solution(method: str, jacobian: Matrix, velocity: Array, damping: Damping) -> Vector:
-    """Joint rates (n,) of a method for a task velocity (m,), or (n, c) for several of them, (m, c)."""
+def rates_and_values(
+    method: str, jacobian: Matrix, velocity: Array, damping: Damping
+) -> tuple[Array, Vector]:
+    """Joint rates (n,) of a method for a task velocity (m,), or (n, c) for several of them, (m, c); singular values."""
     if method != TRANSPOSE:
-        return filtered_inverse(jacobian, damping) @ velocity
+        inverse, sigma = inverse_and_values(jacobian, damping)
+        return inverse @ velocity, sigma
+    sigma = singular_values(jacobian)
     if velocity.ndim == 1:
-        return transposed_rates(jacobian, velocity)
-    return jax.vmap(transposed_rates, (None, 1), 1)(jacobian, velocity)
+        return transposed_rates(jacobian, velocity), sigma
+    return jax.vmap(transposed_rates, (None, 1), 1)(jacobian, velocity), sigma
+
+
+def rate_solution(method: str, jacobian: Matrix, velocity: Array, damping: Damping) -> Array:
+    """The same without the singular values."""
+    return rates_and_values(method, jacobian, velocity, damping)[0]

@@ -44,7 +44,8 @@ class Tracker:
 
     Static: method, of `METHODS`; period, s, between samples; substeps, how often the rates are found anew in a
     period, held in between; integration_steps of the base's Runge-Kutta rule while they are held; feedforward,
-    the target's twist at the instant, as published, or the mean one that takes the target to where it is next;
+    the target's twist at the instant, or the mean one that takes the target to where it is next, with which the
+    published peak rate and index are met to their digits;
     limits: ignore, scale the task, or redistribute it among the joints (`jffsr.tracking.limits`); freedom: which
     directions are tracked, all, all but roll about the tool's z, or the position only. Wrong values raise
     InputError in `check_tracker`, which `track` calls.
@@ -61,7 +62,7 @@ class Tracker:
     period: float = _static(0.25)
     substeps: int = _static(1)
     integration_steps: int = _static(4)
-    feedforward: str = _static(INSTANT)
+    feedforward: str = _static(MEAN)
     limits: str = _static(SCALE)
     freedom: str = _static(ALL)
 

@@ -18,7 +18,13 @@ from jffsr.rollouts.motion import JointGrid, Motion
 from jffsr.rollouts.rollout import check_steps, rollout_grid
 from jffsr.tracking.damping import raised_cosine
 from jffsr.tracking.free_base import response
-from jffsr.tracking.inverses import TRANSPOSE, damping_for, null_space, rate_solution, singular_values
+from jffsr.tracking.inverses import (
+    TRANSPOSE,
+    damping_for,
+    null_space,
+    rates_and_values,
+    singular_values,
+)
 from jffsr.tracking.limits import IGNORE, REDISTRIBUTE, Bounded, rate_bounds, redistributed, scaled
 from jffsr.tracking.redundancy import Situation
 from jffsr.tracking.tool_task import mean_twist, pose_error, tracked_error, tracked_rows
@@ -225,10 +231,10 @@ def _rates(
     if given is None:
         later = target(time + step) if tracker.feedforward == MEAN else None
         pose = position, quaternion
-        rates, rest, bounded = _wanted_rates(s, tracker, jacobian, pose, now, later, moving, step)
+        rates, rest, bounded, sigma = _wanted_rates(s, tracker, jacobian, pose, now, later, moving, step)
     else:
         rates, rest, bounded = given, jnp.zeros_like(given), Bounded(given, jnp.ones(()))
-    sigma = singular_values(jacobian)
+        sigma = singular_values(jacobian)
     return _Seen(
         moving=moving,
         base_twist=s.response.base_twist(bounded.rates),
@@ -254,8 +260,8 @@ def _wanted_rates(
     later: ToolTarget | None,
     moving: _Moving,
     step: Scalar,
-) -> tuple[Vector, Vector, Bounded]:
-    """Rates of the task and beside it that answer the target and the tool's error from it, and what limits leave."""
+) -> tuple[Vector, Vector, Bounded, Vector]:
+    """What `_resolved` gives for the target's twist and the tool's error that is fed back."""
     velocity = now.twist if later is None else mean_twist(now, later, step)
     gains = jnp.repeat(jnp.stack([jnp.asarray(tracker.position_gain), jnp.asarray(tracker.attitude_gain)]), 3)
     off = tracked_error(tracker.freedom, *pose, now.position, now.quaternion)
@@ -272,13 +278,14 @@ def _resolved(
     drift: Vector,
     moving: _Moving,
     step: Scalar,
-) -> tuple[Vector, Vector, Bounded]:
-    """Rates (n,) of the task, the rates beside it, and what the limits make of both."""
+) -> tuple[Vector, Vector, Bounded, Vector]:
+    """Rates (n,) of the task, the rates beside it, what the limits make of both, and the singular values."""
     damping = damping_for(
         tracker.method, jacobian, tracker.lambda_max, tracker.epsilon, tracker.damping, tracker.threshold
     )
-    task = rate_solution(tracker.method, jacobian, wanted, damping)
-    make_up = rate_solution(tracker.method, jacobian, -drift, damping)
+    both = jnp.stack([wanted, -drift], axis=1)
+    found, sigma = rates_and_values(tracker.method, jacobian, both, damping)
+    task, make_up = found[:, 0], found[:, 1]
     beside = jnp.zeros(s.robot.num_joints)
     if tracker.secondary:
         # The projector has the adaptive damping whatever the method: exact away from singularities, smooth in them.
@@ -289,7 +296,7 @@ def _resolved(
         beside = total - task - make_up
     rest = make_up + beside
     if tracker.limits == IGNORE:
-        return task, rest, Bounded(task + rest, jnp.ones(()))
+        return task, rest, Bounded(task + rest, jnp.ones(())), sigma
     lower, upper = rate_bounds(s.robot.limits, s.state.joint_position, moving.joint_rate, step)
     if tracker.limits == REDISTRIBUTE and tracker.method != TRANSPOSE:
         bounded = redistributed(jacobian, wanted, drift, beside, lower, upper, damping)
@@ -298,7 +305,7 @@ def _resolved(
     inside = jnp.all((task + rest >= lower) & (task + rest <= upper))
     # Where nothing is limited the rates are those asked for, to the bit.
     rates = jnp.where(inside, task + rest, bounded.rates)
-    return task, rest, Bounded(rates, jnp.where(inside, 1.0, bounded.share))
+    return task, rest, Bounded(rates, jnp.where(inside, 1.0, bounded.share)), sigma
 
 
 def _held_grid(position: Vector, rate: Vector, step: Scalar, tracker: Tracker) -> JointGrid:

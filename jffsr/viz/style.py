@@ -95,7 +95,9 @@ def line_look(index: int) -> dict:
 
 def level_look(index: int) -> dict:
     """The same of choice `index` of several that are compared; black is left to the runs' own marks."""
-    return {"color": COLOURS[1 + index % (len(COLOURS) - 1)], "linestyle": DASHES[index % len(DASHES)]}
+    # As many colours as patterns: each round pairs them otherwise.
+    turn, place = divmod(index, len(COLOURS) - 1)
+    return {"color": COLOURS[1 + place], "linestyle": DASHES[(place + turn) % len(DASHES)]}
 
 
 def legend_above(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], **options) -> Legend:

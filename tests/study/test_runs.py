@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from jffsr import cli
-from jffsr.study import searching
+from jffsr.study import planning, searching
 from jffsr.study.dataset import open_dataset
 from jffsr.study.summary import summary_text
 

@@ -103,6 +103,19 @@ def test_accuracy_that_is_asked_for_decides(tmp_path, capsys):
     assert "accuracy.rate_deg asks for 0.5 deg/s" in capsys.readouterr().out
 
 
+def test_a_path_through_the_base_is_no_success(tmp_path, capsys):
+    through = [
+        "path.poses.1={position: [0, 0, 0], angles: [-3.14, 0, -2.97]}",
+        "timing.duration=2",
+        "tracker.lambda_max=1",
+        "tracker.epsilon=3",
+    ]
+    for extra in ((), ("compare={one: {}, two: {lambda_max: 2}}",)):
+        folder = tmp_path / str(len(extra))
+        assert run(folder, *through, *extra) == cli.NOT_MET
+        assert "the path leads through the base's body" in capsys.readouterr().out
+
+
 @pytest.mark.slow
 def test_a_tuning_goes_on_to_the_same_bits_where_it_was_stopped(tmp_path, capsys, monkeypatch):
     asked = (

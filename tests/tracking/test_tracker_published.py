@@ -74,10 +74,10 @@ def test_determinant_vanishes_near_the_middle_of_15_seconds(wu, follow):
 
 
 def test_published_peak_rate_and_index_at_25_seconds(printed):
-    assert abs(np.rad2deg(float(peak_rate(printed))) - 5.99) < 0.1
-    assert abs(float(published_index(printed)) / 0.00235 - 1) < 0.1
-    # B is that of the end: along the path it is larger by far.
-    assert float(jnp.max(published_error(printed))) > 1.5 * 0.00235
+    assert abs(np.rad2deg(float(peak_rate(printed))) - 5.99) < 0.005
+    assert abs(float(published_index(printed)) - 0.00235) < 5e-6
+    # B is that of the end: along the path it is larger.
+    assert float(jnp.max(published_error(printed))) > 1.2 * 0.00235
     offset, turn = np.asarray(printed.pose_error[-1, :3]), np.asarray(printed.pose_error[-1, 3:])
     by_hand = 0.5 * np.sqrt(np.sum(offset**2)) + 0.5 * np.sqrt(np.sum((offset * turn) ** 2))
     assert abs(float(published_index(printed)) - by_hand) < 1e-15
@@ -129,25 +129,3 @@ def test_singular_values_and_errors_are_those_of_the_motion(wu, printed):
             printed.pose_error[k, :3],
             atol=1e-13,
         )
-
-
-def test_gradient_through_the_singularity_agrees_with_differences(wu):
-    """By every number of the tracker and by the path's duration, over the crossing of the singularity."""
-    start = wu_path.state_at(wu_path.START)
-
-    def index(numbers):
-        path = replace(wu_path.wu_path(wu, 1.0), duration=numbers[4])
-        tracker = Tracker(numbers[0], numbers[1], position_gain=numbers[2], attitude_gain=numbers[3])
-        tracked = track(wu, path, start, tracker, num_samples=40)
-        return PathError(0.1).smooth(tracked, 10.0), tracked.determinant
-
-    numbers = jnp.array([0.0571, 0.0677, 0.1, 0.2, 25.0])
-    found, _ = jit(jax.jacrev(index, has_aux=True))(numbers)
-    value = jit(jax.vmap(index))
-    steps = 1e-5 * numbers[:, None] * jnp.eye(5)
-    above, determinant = value(numbers + steps)
-    below, _ = value(numbers - steps)
-    assert np.all(np.any(np.asarray(determinant) > 0, axis=1))
-    expected = (above - below) / (2e-5 * numbers)
-    assert np.all(expected != 0)
-    np.testing.assert_allclose(found, expected, rtol=1e-4)

@@ -1,4 +1,4 @@
-"""Tracked motions made again in MuJoCo, its generalized Jacobian along them, and a base rotation in closed form."""
+"""Tracked motions made again in MuJoCo, and its generalized Jacobian along them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from jffsr.crosscheck.mujoco_model import branch_order, to_mjmodel
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.errors import InputError
 from jffsr.robots.builder import build_robot
-from jffsr.robots.loading import describe_robot
 from jffsr.robots.yaml_schema import RobotModel
 from jffsr.tracking.mujoco_check import check_tracked
 from jffsr.tracking.mujoco_report import FORCES, MOMENTUM
@@ -196,32 +195,3 @@ def test_singular_values_are_those_of_mujoco_s_generalized_jacobian(wu):
             tracked.singular_values[k], np.linalg.svd(generalized, compute_uv=False), atol=1e-12
         )
         assert abs(float(tracked.determinant[k]) - np.linalg.det(generalized)) < 1e-12
-
-
-def test_one_link_turns_its_base_by_the_closed_form():
-    """Whatever the tool does, with one joint the base's angle depends on the joint's alone."""
-    whole = describe_robot("hu_2011_planar2")
-    tool = dataclasses.replace(whole.end_effectors[0], link="link1")
-    robot = build_robot(
-        dataclasses.replace(
-            whole, links=whole.links[:2], joints=whole.joints[:1], shapes=(), end_effectors=(tool,)
-        )
-    )
-    start = wu_path.state_at([0.3])
-    position, quaternion = wu_path.tool_pose(robot, start)
-    target = nodding(position, quaternion)
-    tracker = Tracker(method="transpose", limits="ignore", integration_steps=8)
-    motion = jit(lambda t: track(robot, target, start, t, 6.0))(tracker).motion
-    q = np.asarray(motion.joint_position)[:, 0]
-    assert np.ptp(q) > 0.05
-    m0, m1, i0, i1, r0, l1 = 400.0, 40.0, 66.67, 3.33, 0.5, 0.5
-    mu = m0 * m1 / (m0 + m1)
-    a, c, b = i1 + mu * l1**2, i0 + mu * r0**2, mu * r0 * l1
-    s = np.sqrt((a + c) ** 2 - 4 * b**2)
-
-    def turned(q):
-        ratio = np.sqrt((a + c - 2 * b) / (a + c + 2 * b))
-        return -q / 2 - (a - c) / s * (np.arctan(ratio * np.tan(q / 2)) + np.pi * np.round(q / (2 * np.pi)))
-
-    w, _, _, z = np.asarray(motion.base_quaternion).T
-    np.testing.assert_allclose(2 * np.arctan2(z, w), turned(q) - turned(q[0]), atol=1e-11)

@@ -14,6 +14,7 @@ from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.significance import compare, holm
 from jffsr.study.sweep.table import keys_of, markdown, rows_of
+from jffsr.viz.style import level_look
 from jffsr.viz.sweep_boxes import draw_boxes
 from jffsr.viz.sweep_convergence import _held, draw_sweep_convergence
 from jffsr.viz.sweep_map import draw_map
@@ -180,3 +181,8 @@ def test_show_draws_a_sweep(dataset, tmp_path, capsys):
     (tmp_path / "sweep.nc").write_bytes(b"half")
     assert cli.main(["show", str(tmp_path)]) == cli.BAD_INPUT
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_choices_look_different_in_colour_or_pattern():
+    looks = [level_look(k) for k in range(36)]
+    assert len({(look["color"], str(look["linestyle"])) for look in looks}) == 36

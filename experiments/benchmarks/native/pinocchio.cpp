@@ -5,13 +5,12 @@
 #include <cmath>
 #include <vector>
 
-#include <pinocchio/multibody.hpp>
+#include "model.hpp"
+
 #include <pinocchio/algorithm/crba.hpp>
 
 #include "law.hpp"
 #include "threads.hpp"
-
-namespace pin = pinocchio;
 
 namespace {
 
@@ -20,12 +19,6 @@ struct Robot {
     std::vector<double> joints;
     int count;
 };
-
-typedef Eigen::Matrix<double, 3, 3, Eigen::RowMajor> Rows;
-
-pin::Inertia inertia_of(const double* mass, const double* com, const double* inertia) {
-    return pin::Inertia(*mass, Eigen::Map<const Eigen::Vector3d>(com), Eigen::Map<const Rows>(inertia));
-}
 
 // What one thread needs: Pinocchio's data, and the configuration and velocity with the base's in front.
 struct Worker {
@@ -114,17 +107,7 @@ void* make_robot(int count, const int* parents, const double* rotation, const do
     Robot* robot = new Robot;
     robot->count = count;
     robot->joints.assign(joints, joints + count * JOINT_COLUMNS);
-    pin::Model& model = robot->model;
-    std::vector<pin::JointIndex> body(count + 1);
-    body[0] = model.addJoint(0, pin::JointModelFreeFlyer(), pin::SE3::Identity(), "base");
-    model.appendBodyToJoint(body[0], inertia_of(mass, com, inertia), pin::SE3::Identity());
-    for (int i = 0; i < count; ++i) {
-        const pin::SE3 place(Eigen::Map<const Rows>(rotation + 9 * i), Eigen::Map<const Eigen::Vector3d>(offset + 3 * i));
-        body[i + 1] = model.addJoint(body[parents[i]], pin::JointModelRZ(), place, "joint" + std::to_string(i));
-        const int k = i + 1;
-        model.appendBodyToJoint(body[k], inertia_of(mass + k, com + 3 * k, inertia + 9 * k), pin::SE3::Identity());
-    }
-    model.gravity.setZero();
+    robot->model = arm_model(count, parents, rotation, offset, mass, com, inertia);
     return robot;
 }
 

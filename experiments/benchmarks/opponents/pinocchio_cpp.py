@@ -61,10 +61,15 @@ def include_folders() -> tuple[Path, ...]:
     raise ImportError("the installed Pinocchio has no C++ headers")
 
 
-def _library():
+def with_pinocchio(source: str) -> tuple[ctypes.CDLL, float]:
+    """A source of `native` compiled against the wheel's headers, and the seconds that it took."""
     # The list of joint types is longer than Boost's lists are by default.
     boost = ("-DBOOST_MPL_LIMIT_LIST_SIZE=30", "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS")
-    code, seconds = library("pinocchio.cpp", *boost, *(f"-isystem{folder}" for folder in include_folders()))
+    return library(source, *boost, *(f"-isystem{folder}" for folder in include_folders()))
+
+
+def _library():
+    code, seconds = with_pinocchio("pinocchio.cpp")
     code.make_robot.restype = ctypes.c_void_p
     return code, seconds
 

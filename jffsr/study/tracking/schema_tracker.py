@@ -50,7 +50,7 @@ class Tracker(Section):
     period: Annotated[float, number(gt=0, le=1e3, unit="s")] = 0.25
     substeps: Annotated[int, whole(1, 10_000)] = 1  # how often the rates are found anew in a period
     integration_steps: Annotated[int, whole(1, 1000)] = 4  # of the base while rates are held
-    feedforward: Annotated[Literal["instant", "mean"], choice("instant", "mean")] = "instant"
+    feedforward: Annotated[Literal["instant", "mean"], choice("instant", "mean")] = "mean"
     limits: Annotated[
         Literal["ignore", "scale", "redistribute"], choice("ignore", "scale", "redistribute")
     ] = "scale"

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jffsr.optimizers.driver import Outcome
-from jffsr.study.summary import versions
+from jffsr.study.summary import last_lines, versions
 from jffsr.study.tracking.building import TrackingTask
 from jffsr.study.tracking.schema import TrackingConfig
+from jffsr.tracking.outcome import TrackingCode
 
 if TYPE_CHECKING:
     from jffsr.study.tracking.running import TrackedPath
 
+_IMPOSSIBLE = (TrackingCode.UNREACHABLE, TrackingCode.THROUGH_BASE, TrackingCode.NOT_FINITE)
 _NUMBERS = ("lambda_max", "epsilon", "damping", "threshold", "position_gain", "attitude_gain")
 
 
@@ -33,7 +35,8 @@ def tracking_summary(
         "name": judged.result.code.name.lower(),
         "sentence": judged.result.sentence,
     }
-    if config.compare:
+    # A limit that is broken or a path that is lost is what a comparison is to show; a path that nobody can go is not.
+    if config.compare and not all(path.result.code in _IMPOSSIBLE for path in paths.values()):
         result = {"code": 0, "name": "compared", "sentence": f"{len(paths)} trackers compared on one path"}
     return {
         "kind": "tracking",
@@ -48,6 +51,7 @@ def tracking_summary(
             "objective": 0 if searched is None else searched.evaluations,
             "gradient": 0 if searched is None else searched.gradient_evaluations,
         },
+        "tuned": [] if config.tuning is None else list(config.tuning.parameters),
         "search_ended": None if searched is None else searched.reason,
         "seconds": dict(seconds),
         "seed": config.seed,
@@ -115,9 +119,8 @@ def summary_text(summary: dict[str, Any]) -> str:
             lines.append(f"  {label}: {tracker['result']['sentence']}")
     counts = summary["evaluations"]
     if counts["objective"] or counts["gradient"]:
-        numbers = ", ".join(
-            f"{k} {v:.4g}" for k, v in summary["trackers"][summary["judged"]]["numbers"].items()
-        )
+        own = summary["trackers"][summary["judged"]]["numbers"]
+        numbers = ", ".join(f"{name} {own[name]:.4g}" for name in summary["tuned"])
         lines += ["", f"  tuned         index {summary['cost']:.4g} after {counts['objective']} paths and "]
         lines[-1] += f"{counts['gradient']} gradients: {numbers}"
     check = summary["verification"]
@@ -129,12 +132,7 @@ def summary_text(summary: dict[str, Any]) -> str:
     ]
     if summary.get("singularities_text"):
         lines += ["", *(f"  {line}" for line in summary["singularities_text"].splitlines())]
-    crosscheck = check.get("mujoco")
-    if crosscheck:
-        lines.append(f"  simulators    {crosscheck['sentence']}")
-    seconds = summary["seconds"]
-    lines.append(f"  seconds       {seconds['total']:.1f} in all, {seconds['compile']:.1f} of them compiling")
-    return "\n".join(lines)
+    return "\n".join(lines + last_lines(summary))
 
 
 def _scaled(value: float | None, factor: float) -> str:
