@@ -18,7 +18,13 @@ from jffsr.rollouts.motion import JointGrid, Motion
 from jffsr.rollouts.rollout import check_steps, rollout_grid
 from jffsr.tracking.damping import raised_cosine
 from jffsr.tracking.free_base import response
-from jffsr.tracking.inverses import TRANSPOSE, damping_for, null_space, rates_and_values
+from jffsr.tracking.inverses import (
+    TRANSPOSE,
+    damping_for,
+    null_space,
+    rates_and_values,
+    singular_values,
+)
 from jffsr.tracking.limits import IGNORE, REDISTRIBUTE, Bounded, rate_bounds, redistributed, scaled
 from jffsr.tracking.redundancy import Situation
 from jffsr.tracking.tool_task import mean_twist, pose_error, tracked_error, tracked_rows
@@ -82,6 +88,48 @@ def track(
     )
 
 
+def track_rates(
+    robot: Robot,
+    target: Target,
+    initial_state: State,
+    rates: Array,
+    duration: Scalar | float,
+    momentum: Twist | None = None,
+    end_effector: str | None = None,
+    base_mode: str = FLOATING,
+    integration_steps: int = 4,
+) -> Tracked:
+    """What `track` reports, of joint rates (K, n) that are given: each is held for a share 1/K of the duration, s.
+
+    limited is false and share one. Raises InputError for rates of another robot and for what `track` refuses.
+    """
+    base_freedom(base_mode)
+    robot.end_effector_index(end_effector)
+    rates = jnp.asarray(rates)
+    if rates.ndim != 2 or rates.shape[0] < 1 or rates.shape[1] != robot.num_joints:
+        raise InputError(
+            f"rates have the shape {rates.shape}; (K, {robot.num_joints}), a row for each time they are held, is "
+            "expected"
+        )
+    tracker = Tracker(integration_steps=check_steps(integration_steps))
+    momentum = jnp.zeros(6) if momentum is None else jnp.asarray(momentum)
+    start = State(*(jnp.asarray(x, dtype=float) for x in _pose(initial_state)))
+    steps = rates.shape[0]
+    return _tracked(
+        robot,
+        target,
+        start,
+        initial_state,
+        tracker,
+        duration / steps,
+        steps,
+        momentum,
+        end_effector,
+        base_mode,
+        jnp.concatenate([rates, rates[-1:]]),
+    )
+
+
 def _pose(state: State) -> tuple:
     return state.base_position, state.base_quaternion, state.joint_position
 
@@ -117,14 +165,17 @@ class _Seen(NamedTuple):
 
 
 def _tracked(
-    robot, target, start, initial, tracker, step, steps, momentum, end_effector, base_mode
+    robot, target, start, initial, tracker, step, steps, momentum, end_effector, base_mode, given=None
 ) -> Tracked:
-    def advance(moving: _Moving, time: Scalar) -> tuple[_Moving, _Seen]:
+    """The motion, by the tracker's rates or by those given (steps + 1, n), the last of which is only reported."""
+
+    def advance(moving: _Moving, row: tuple[Scalar, Vector | None]) -> tuple[_Moving, _Seen]:
+        time, rates = row
         state = State(moving.base_position, moving.base_quaternion, moving.joint_position)
         kin = kinematics(robot, state)
         answer = response(robot, kin, momentum, end_effector, base_mode)
         situation = Situation(robot, state, kin, answer, start, momentum, end_effector, base_mode)
-        seen = _rates(situation, target, tracker, time, step, moving)
+        seen = _rates(situation, target, tracker, time, step, moving, rates)
         inner = rollout_grid(
             robot, _held_grid(moving.joint_position, seen.held, step, tracker), state, momentum, base_mode
         )
@@ -142,7 +193,7 @@ def _tracked(
     first = _Moving(start.base_position, start.base_quaternion, start.joint_position, rate)
     time = jnp.arange(steps + 1) * step
     # One step more than the motion has: it reports where the last one led.
-    _, seen = jax.lax.scan(advance, first, time)
+    _, seen = jax.lax.scan(advance, first, (time, given))
     error = jax.vmap(pose_error)(
         seen.tool_position, seen.tool_quaternion, seen.target.position, seen.target.quaternion
     )
@@ -164,21 +215,26 @@ def _tracked(
 
 
 def _rates(
-    s: Situation, target: Target, tracker: Tracker, time: Scalar, step: Scalar, moving: _Moving
+    s: Situation,
+    target: Target,
+    tracker: Tracker,
+    time: Scalar,
+    step: Scalar,
+    moving: _Moving,
+    given: Vector | None,
 ) -> _Seen:
-    """The rates to hold from this time on, and all that is reported of it."""
+    """The rates to hold from this time on, the tracker's or those given, and all that is reported of it."""
     robot, kin = s.robot, s.kin
     position, quaternion = end_effector_pose(robot, kin, s.end_effector)
     jacobian = tracked_rows(tracker.freedom, quaternion, s.response.jacobian)
     now = target(time)
-    velocity = now.twist
-    if tracker.feedforward == MEAN:
-        velocity = mean_twist(now, target(time + step), step)
-    gains = jnp.repeat(jnp.stack([jnp.asarray(tracker.position_gain), jnp.asarray(tracker.attitude_gain)]), 3)
-    off = tracked_error(tracker.freedom, position, quaternion, now.position, now.quaternion)
-    wanted = tracked_rows(tracker.freedom, quaternion, velocity - gains * off)
-    drift = tracked_rows(tracker.freedom, quaternion, s.response.drift)
-    rates, rest, bounded, sigma = _resolved(s, tracker, jacobian, wanted, drift, moving, step)
+    if given is None:
+        later = target(time + step) if tracker.feedforward == MEAN else None
+        pose = position, quaternion
+        rates, rest, bounded, sigma = _wanted_rates(s, tracker, jacobian, pose, now, later, moving, step)
+    else:
+        rates, rest, bounded = given, jnp.zeros_like(given), Bounded(given, jnp.ones(()))
+        sigma = singular_values(jacobian)
     return _Seen(
         moving=moving,
         base_twist=s.response.base_twist(bounded.rates),
@@ -193,6 +249,25 @@ def _rates(
         limited=jnp.any(bounded.rates != rates + rest),
         share=bounded.share,
     )
+
+
+def _wanted_rates(
+    s: Situation,
+    tracker: Tracker,
+    jacobian: Array,
+    pose: tuple[Vector3, Quaternion],
+    now: ToolTarget,
+    later: ToolTarget | None,
+    moving: _Moving,
+    step: Scalar,
+) -> tuple[Vector, Vector, Bounded, Vector]:
+    """What `_resolved` gives for the target's twist and the tool's error that is fed back."""
+    velocity = now.twist if later is None else mean_twist(now, later, step)
+    gains = jnp.repeat(jnp.stack([jnp.asarray(tracker.position_gain), jnp.asarray(tracker.attitude_gain)]), 3)
+    off = tracked_error(tracker.freedom, *pose, now.position, now.quaternion)
+    wanted = tracked_rows(tracker.freedom, pose[1], velocity - gains * off)
+    drift = tracked_rows(tracker.freedom, pose[1], s.response.drift)
+    return _resolved(s, tracker, jacobian, wanted, drift, moving, step)
 
 
 def _resolved(
