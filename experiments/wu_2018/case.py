@@ -15,8 +15,10 @@ from jffsr.compiling import jit
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.tracking.between_samples import errors_between
 from jffsr.tracking.indices import peak_rate, published_index
+from jffsr.tracking.reach import inside_base
 from jffsr.tracking.tool_task import ALL, pose_error
 from jffsr.tracking.tracked import Tracked
 from jffsr.tracking.tracker import Tracker
@@ -147,3 +149,37 @@ def measure(case: Case, target: Any, tracked: Tracked, freedom: str = ALL) -> Me
         time=time,
         errors=errors,
     )
+
+
+@jit
+def _anchors(robot, motion):
+    def one(position, quaternion, q):
+        return kinematics(robot, State(position, quaternion, q)).anchor, quaternion_to_matrix(quaternion)
+
+    return jax.vmap(one)(motion.base_position, motion.base_quaternion, motion.joint_position)
+
+
+def inside_share(case: Case, tracked: Tracked) -> float:
+    """The share of the samples at which the arm's way from joint 2 on to the tool, by straight lines from joint to
+    joint, leads through the body of the base that the catalogue draws; the paper prints none."""
+    anchors, rotation = (np.asarray(x) for x in _anchors(case.robot, tracked.motion))
+    corners = np.concatenate([anchors[:, 1:], np.asarray(tracked.tool_position)[:, None]], axis=1)
+    part = np.linspace(0, 1, 40)[:, None]
+    points = np.concatenate(
+        [
+            a[:, None] + part * (b - a)[:, None]
+            for a, b in zip(*(corners.swapaxes(0, 1)[s] for s in _PAIRS), strict=True)
+        ],
+        axis=1,
+    )
+    count = points.shape[1]
+    inside = inside_base(
+        case.robot,
+        np.repeat(np.asarray(tracked.motion.base_position), count, axis=0),
+        np.repeat(rotation, count, axis=0),
+        points.reshape(-1, 3),
+    )
+    return float(np.mean(inside.reshape(-1, count).any(axis=1)))
+
+
+_PAIRS = (slice(None, -1), slice(1, None))

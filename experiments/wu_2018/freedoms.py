@@ -9,7 +9,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from experiments.wu_2018.case import ADAPTIVE, PERIOD, POSTURES_DEG, Case, Measured, follow, measure
+from experiments.wu_2018.case import (
+    ADAPTIVE,
+    PERIOD,
+    POSTURES_DEG,
+    Case,
+    Measured,
+    follow,
+    inside_share,
+    measure,
+)
 from experiments.wu_2018.published import grid_of_pairs, pick, scan, with_feedback
 from jffsr.compiling import jit
 from jffsr.tracking.refinement import refine_tracking
@@ -30,14 +39,15 @@ FEEDBACK = Tracker(
     feedforward=MEAN,
     limits="ignore",
 )
-ELBOW = "other elbow"
+ELBOW, WRIST = "other elbow", "wrist turned over"
 _FINE = 12000
 _PLACES = 1200
 
 
 @dataclass(frozen=True)
 class Gained:
-    """A motion, what it tracks, and what is measured of it; in words, what was free and how it was used."""
+    """A motion, what it tracks, and what is measured of it; in words, what was free and how it was used; inside, the
+    share of samples at which the arm leads through the drawn base."""
 
     freedom: str
     how: str
@@ -45,6 +55,7 @@ class Gained:
     target: Any
     measured: Measured
     verification: Any = None
+    inside: float = 0.0
 
 
 def refined(case: Case, of: Gained, peak: float, iterations: int, **options: Any) -> Gained:
@@ -178,6 +189,7 @@ def freedoms(case: Case, duration: float, reference: Measured, every: bool = Tru
                 roll, "rates and relaxed roll", "every held rate refined; roll about the tool's z not counted"
             )
         )
+    rows.append(turned_over(case, duration, peak, reference))
     rows.append(
         tracked_with(case, duration, ADAPTIVE, ELBOW, "posture", "published method from the other elbow")
     )
@@ -194,6 +206,15 @@ def freedoms(case: Case, duration: float, reference: Measured, every: bool = Tru
     return [_verified(case, row) for row in rows]
 
 
+def turned_over(case: Case, duration: float, peak: float, reference: Measured) -> Gained:
+    """The same arm with its forearm and wrist turned over, every held rate refined from the better of two starts."""
+    starts = (tracked_with(case, duration, tracker, WRIST, "", "") for tracker in (ADAPTIVE, FEEDBACK))
+    best = min((refined(case, of, peak, 20) for of in starts), key=lambda of: of.measured.over(reference))
+    return _named(
+        best, "wrist turned over, and rates", "forearm and wrist turned over, every held rate refined"
+    )
+
+
 def _named(found: Gained, freedom: str, how: str) -> Gained:
     return Gained(freedom, how, found.tracked, found.target, found.measured)
 
@@ -203,7 +224,15 @@ _verify = jit(verify_tracking)
 
 def _verified(case: Case, row: Gained) -> Gained:
     verification = jax.tree.map(np.asarray, _verify(case.robot, row.tracked))
-    return Gained(row.freedom, row.how, row.tracked, row.target, row.measured, verification)
+    return Gained(
+        row.freedom,
+        row.how,
+        row.tracked,
+        row.target,
+        row.measured,
+        verification,
+        inside_share(case, row.tracked),
+    )
 
 
 def postures(case: Case, duration: float) -> dict[str, Measured]:

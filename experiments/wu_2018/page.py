@@ -205,6 +205,7 @@ def _freedoms(duration: float, rows: Sequence[Any]) -> str:
                 f"{found.position:.4g}",
                 f"{found.attitude:.4g}",
                 f"{gain:.3g}",
+                f"{100 * row.inside:.0f} %",
                 f"{float(v.momentum_drift):.1e}",
                 f"{max(float(v.tool_position_difference), float(v.tool_attitude_difference)):.1e}",
             ]
@@ -216,6 +217,7 @@ def _freedoms(duration: float, rows: Sequence[Any]) -> str:
         "largest position error [mm]",
         "largest attitude error [deg]",
         "times less",
+        "samples inside the drawn base",
         "momentum drift",
         "re-run differs by [m, rad]",
     )
@@ -236,9 +238,10 @@ def _tenth(freedoms: Mapping[float, Sequence[Any]]) -> str:
     for duration, rows in freedoms.items():
         reference, found = rows[0].measured, rows[-1].measured
         share = found.over(reference)
+        inside = f"; {100 * rows[-1].inside:.0f} % of its samples lead through the drawn base"
         reached = share < 0.1 and found.peak <= reference.peak
         lines.append(
             f"{duration:g} s: {100 * share:.2g} % of the error at {found.peak:.3f} against {reference.peak:.3f} deg/s; "
-            f"less than a tenth is {'reached' if reached else 'not reached'}."
+            f"less than a tenth is {'reached' if reached else 'not reached'}{inside}."
         )
     return " ".join(lines)
