@@ -130,7 +130,7 @@ def grid_of_pairs(side: int = 36) -> Tracker:
 def _many(lambda_max: np.ndarray, epsilon: np.ndarray, gain: np.ndarray | None = None) -> Tracker:
     """Adaptive trackers of arrays (m,) of numbers; with gains, 1/s, they feed the error back."""
     full = np.ones_like(lambda_max)
-    gain, feedforward = (0 * full, "instant") if gain is None else (gain, "mean")
+    gain = 0 * full if gain is None else gain
     return Tracker(
         lambda_max=lambda_max,
         epsilon=epsilon,
@@ -138,7 +138,7 @@ def _many(lambda_max: np.ndarray, epsilon: np.ndarray, gain: np.ndarray | None =
         threshold=full,
         position_gain=gain,
         attitude_gain=gain,
-        feedforward=feedforward,
+        feedforward="mean",
         limits="ignore",
     )
 
