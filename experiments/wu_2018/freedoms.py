@@ -193,7 +193,7 @@ def freedoms(case: Case, duration: float, reference: Measured, every: bool = Tru
     rows.append(
         tracked_with(case, duration, ADAPTIVE, ELBOW, "posture", "published method from the other elbow")
     )
-    how = "the same, target's mean twist and error fed back (1/s)"
+    how = "the same, the error fed back (1/s)"
     fed_back = tracked_with(case, duration, FEEDBACK, ELBOW, "posture and feedback", how)
     rows.append(fed_back)
     rows.append(
