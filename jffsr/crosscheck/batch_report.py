@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from jffsr.crosscheck.report import Tolerances
+from jffsr.crosscheck.rows import finite_or_none
 
 _ROWS = (
     ("attitude", "base attitude", "rad"),
@@ -98,11 +98,13 @@ class BatchReport:
             "step": self.step,
             "momentum": list(self.momentum),
             "tolerances": {item.name: getattr(self.tolerances, item.name) for item in fields(Tolerances)},
-            "worst": {what: {"robot": index, "value": _finite(x)} for what, (index, x) in worst.items()},
-            **{what: [_finite(float(x)) for x in getattr(self, what)] for what, _, _ in _ROWS},
+            "worst": {
+                what: {"robot": index, "value": finite_or_none(x)} for what, (index, x) in worst.items()
+            },
+            **{what: [finite_or_none(float(x)) for x in getattr(self, what)] for what, _, _ in _ROWS},
             "compile_seconds": self.compile_seconds,
             "run_seconds": self.run_seconds,
-            "robots_per_second": _finite(self.robots_per_second),
+            "robots_per_second": finite_or_none(self.robots_per_second),
             "passed": self.passed,
             "sentence": self.sentence,
         }
@@ -127,7 +129,3 @@ class BatchReport:
             f"second"
         )
         return "\n".join([*lines, self.sentence])
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any
+
+from jffsr.crosscheck.rows import aligned, finite_or_none
 
 ENGINE_TITLES = {"mujoco": "MuJoCo", "mjx": "MJX"}
 
@@ -125,7 +126,7 @@ class CrosscheckReport:
         rows = []
         for entry in self.comparisons:
             row = {item.name: getattr(entry, item.name) for item in fields(entry)}
-            rows.append({key: _finite(value) for key, value in row.items()})
+            rows.append({key: finite_or_none(value) for key, value in row.items()})
         return {
             "robot": self.robot,
             "duration": self.duration,
@@ -159,17 +160,8 @@ class CrosscheckReport:
                     f"{entry.run_seconds:.1f}",
                 )
             )
-        widths = [max(len(row[k]) for row in rows) for k in range(len(head))]
-        lines = []
-        for row in rows:
-            first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
-            lines.append("  ".join([first.strip().ljust(widths[0]), *others]))
-        return "\n".join([*lines, self.sentence])
+        return "\n".join([*aligned(rows), self.sentence])
 
 
 def _milliseconds(step: float) -> str:
     return f"{1e3 * step:.4g} ms"
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value

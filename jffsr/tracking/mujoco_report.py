@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+
+from jffsr.crosscheck.rows import aligned, finite_or_none
 
 FORCES, MOMENTUM = "forces", "momentum"
 TITLES = {FORCES: "torques and impulses", MOMENTUM: "momentum equation"}
@@ -127,7 +128,7 @@ class TrackedCheck:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, lists and text, ready for JSON; a number that is not finite becomes None."""
         rows = [
-            {item.name: _finite(getattr(entry, item.name)) for item in fields(entry)}
+            {item.name: finite_or_none(getattr(entry, item.name)) for item in fields(entry)}
             for entry in self.comparisons
         ]
         return {
@@ -152,13 +153,4 @@ class TrackedCheck:
             numbers = (*entry.pose.values(), entry.tracking, entry.momentum_linear, entry.momentum_angular)
             step = "" if entry.step is None else f"{1e3 * entry.step:.4g}"
             rows.append((TITLES[entry.way], step, *(f"{x:.2e}" for x in numbers), f"{entry.run_seconds:.1f}"))
-        widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-        lines = []
-        for row in rows:
-            first, *others = (text.rjust(width) for text, width in zip(row, widths, strict=True))
-            lines.append("  ".join([first.strip().ljust(widths[0]), *others]))
-        return "\n".join([*lines, self.sentence])
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return "\n".join([*aligned(rows), self.sentence])
