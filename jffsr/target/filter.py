@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from jffsr.errors import InputError
 from jffsr.target.acquisition import acquire
 from jffsr.target.camera import Camera, Measurements
-from jffsr.target.estimate import TargetEstimate
+from jffsr.target.estimate import INERTIA, OFFSET, TargetEstimate
 from jffsr.target.filter_steps import ProcessNoise, predict_step, update_step
 from jffsr.target.prior import TargetPrior
 from jffsr.types import Array
@@ -32,13 +32,18 @@ class FilterSettings:
     """How a target is filtered.
 
     acquisition: how many of the first poses are fitted together; gate_probability: share of good poses that the gate
-    lets pass, by the chi-square distribution of the normalised squared innovation; process_noise; lost_after: how many
-    poses refused in a row mean that the track is lost. Raises InputError for numbers that make no sense.
+    lets pass, by the chi-square distribution of the normalised squared innovation; process_noise, what disturbs the
+    target; linearisation_noise, what makes up for products of errors that the filter neglects, and fades as inertia and
+    offset become known; lost_after: how many poses refused in a row mean that the track is lost.
+    Raises InputError for numbers that make no sense.
     """
 
-    acquisition: int = 50
+    acquisition: int = 100
     gate_probability: float = 0.999
     process_noise: ProcessNoise = field(default_factory=ProcessNoise)
+    linearisation_noise: ProcessNoise = field(
+        default_factory=lambda: ProcessNoise(1.2e-4, 5e-5, 2.4e-3, 1.2e-3)
+    )
     lost_after: int = 10
 
     def __post_init__(self):
@@ -82,8 +87,8 @@ def filter_target(
 ) -> FilteredTarget:
     """The estimates of a target from the poses (N, ...) of its marker in I; vmap for many, jit for speed.
 
-    Each estimate is at a pose's exposure; it is to hand the camera's delay later, and `predict_grasp` takes it on to any
-    time. Raises InputError for fewer poses than the acquisition takes.
+    Each estimate is at a pose's exposure; it is to hand the camera's delay later, and `predict_grasp` takes it on
+    to any time. Raises InputError for fewer poses than the acquisition takes.
     """
     settings = settings or FilterSettings()
     count, window = measurements.time.shape[0], settings.acquisition
@@ -96,6 +101,7 @@ def filter_target(
     early, late = (
         jax.tree.map(lambda x, k=k: x[k], measurements) for k in (slice(window), slice(window, None))
     )
+    physical = settings.process_noise.covariance(interval)
     start = acquire(early, interval, prior, noise, settings.gate, _ORDER)
 
     def step(carry, measured):
@@ -104,11 +110,24 @@ def filter_target(
             estimate, measured.position, measured.quaternion, measured.seen, noise, settings.gate
         )
         refused = jnp.where(used, 0, refused + measured.seen)
-        following = predict_step(estimate, interval, settings.process_noise, _ORDER)
+        added = physical + settings.linearisation_noise.covariance(interval, *_unsureness(estimate, prior))
+        following = predict_step(estimate, interval, added, _ORDER)
         return (following, refused), (estimate, residual, squared, used, refused)
 
     _, course = jax.lax.scan(step, (start, jnp.zeros((), int)), late)
     return FilteredTarget(*course, lost=course[-1] >= settings.lost_after)
+
+
+def _unsureness(estimate: TargetEstimate, prior: TargetPrior) -> tuple[Array, Array]:
+    """How the products of two errors, which the filter neglects, have shrunk since the prior: of rotation, translation.
+
+    An extended filter is linearised at ever new estimates, and so grows too sure of what it hardly sees: rate and
+    inertia together, and the offset. The noise that makes up for it fades as the inertia and the offset become known.
+    """
+    variance = jnp.diagonal(estimate.covariance)
+    inertia = jnp.mean(variance[INERTIA]) / prior.inertia_deviation**2
+    offset = jnp.mean(variance[OFFSET]) / prior.offset_deviation**2
+    return inertia**2, offset
 
 
 def expected_innovation_squared(settings: FilterSettings) -> float:

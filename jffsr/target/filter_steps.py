@@ -34,36 +34,39 @@ from jffsr.types import Array, Matrix, Matrix3, Scalar
 
 @dataclass(frozen=True)
 class ProcessNoise:
-    """White accelerations that disturb a target, as the roots of their densities of power.
+    """White accelerations of a target and random walks of its constants, as the roots of their densities of power.
 
-    angular_acceleration, rad/s^2/sqrt(Hz), and linear_acceleration, m/s^2/sqrt(Hz). A body free of torque and force
-    has none, but an extended filter without them is linearised at ever new estimates and grows too sure of
-    combinations of rate and inertia; the defaults are what keeps its covariance honest at the default prior.
+    angular_acceleration, rad/s^2/sqrt(Hz); linear_acceleration, m/s^2/sqrt(Hz); inertia, of the five numbers,
+    1/sqrt(s); offset, m/sqrt(s). A free rigid body has none of them, and zero is the default; give some where sunlight,
+    gravity gradient or sloshing fuel act.
     """
 
-    angular_acceleration: float = 1e-4
-    linear_acceleration: float = 4e-5
+    angular_acceleration: float = 0.0
+    linear_acceleration: float = 0.0
+    inertia: float = 0.0
+    offset: float = 0.0
 
     def __post_init__(self):
-        for what in ("angular_acceleration", "linear_acceleration"):
+        for what in ("angular_acceleration", "linear_acceleration", "inertia", "offset"):
             value = getattr(self, what)
             if not (np.isfinite(value) and value >= 0):
                 raise InputError(f"process noise: {what} is {value:g}; zero or more is expected")
 
-    def covariance(self, duration: Scalar) -> Matrix:
-        """What the accelerations add to the covariance (20, 20) over a short `duration`, s."""
+    def covariance(self, duration: Scalar, rotational: Scalar = 1.0, translational: Scalar = 1.0) -> Matrix:
+        """What they add to the covariance (20, 20) over a short `duration`, s; the powers of angular acceleration and
+        inertia and those of linear acceleration and offset times a factor each."""
         added = jnp.zeros((NUM_ERRORS, NUM_ERRORS))
         eye = jnp.eye(3)
-        for density, place, rate in (
-            (self.angular_acceleration, ATTITUDE, RATE),
-            (self.linear_acceleration, POSITION, VELOCITY),
+        for power, place, rate in (
+            (rotational * self.angular_acceleration**2, ATTITUDE, RATE),
+            (translational * self.linear_acceleration**2, POSITION, VELOCITY),
         ):
-            power = density**2
             added = added.at[place, place].set(power * duration**3 / 3 * eye)
             added = added.at[place, rate].set(power * duration**2 / 2 * eye)
             added = added.at[rate, place].set(power * duration**2 / 2 * eye)
             added = added.at[rate, rate].set(power * duration * eye)
-        return added
+        added = added.at[INERTIA, INERTIA].set(rotational * self.inertia**2 * duration * jnp.eye(5))
+        return added.at[OFFSET, OFFSET].set(translational * self.offset**2 * duration * eye)
 
 
 def advance(estimate: TargetEstimate, duration: Scalar, order: int) -> tuple[TargetEstimate, Matrix]:
@@ -113,11 +116,11 @@ def advance(estimate: TargetEstimate, duration: Scalar, order: int) -> tuple[Tar
 
 
 def predict_step(
-    estimate: TargetEstimate, duration: Scalar, process_noise: ProcessNoise, order: int
+    estimate: TargetEstimate, duration: Scalar, added: Matrix | float, order: int
 ) -> TargetEstimate:
-    """The estimate `duration` s later with its covariance."""
+    """The estimate `duration` s later with its covariance, to which a matrix (20, 20) of disturbances is added."""
     moved, transition = advance(estimate, duration, order)
-    grown = transition @ estimate.covariance @ transition.T + process_noise.covariance(duration)
+    grown = transition @ estimate.covariance @ transition.T + added
     return replace(moved, covariance=grown)
 
 

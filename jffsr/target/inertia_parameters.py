@@ -10,11 +10,13 @@ where moments are equal and axes undefined.
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.robots.checks import check_rigid
+from jffsr.robots.lumping import on_host, to_array
 from jffsr.types import Array, Matrix3, Vector3
 
 NUM_PARAMETERS = 5
@@ -41,23 +43,28 @@ def parameters_from_inertia(inertia: Matrix3) -> Array:
     return jnp.concatenate([jnp.log(diagonal[..., :2] / scale[..., None]), below / scale[..., None]], axis=-1)
 
 
-def checked_parameters(where: str, inertia: np.ndarray) -> np.ndarray:
-    """The five numbers of an inertia (3, 3), its diagonal (3,) or principal ratios (3,), checked on the host.
+def checked_parameters(where: str, inertia: Array) -> Array:
+    """The five numbers of an inertia (3, 3) or its diagonal (3,), checked on the host; traced numbers pass.
 
     Raises InputError for what no rigid body can have, and for a flat body, which an estimate cannot start from.
     """
-    inertia = np.asarray(inertia, dtype=float)
-    inertia = np.diag(inertia) if inertia.shape == (3,) else inertia
+    inertia = to_array(inertia)
+    inertia = inertia[:, None] * np.eye(3) if inertia.shape == (3,) else inertia
     if inertia.shape != (3, 3):
         raise InputError(f"{where}: inertia has shape {inertia.shape}; (3,) or (3, 3) is expected")
-    check_rigid(where, 1.0, np.zeros(3), inertia)
-    moments = np.linalg.eigvalsh(inertia)
+    numbers = on_host(inertia)
+    if numbers is None:
+        return parameters_from_inertia(inertia)
+    check_rigid(where, 1.0, np.zeros(3), numbers[0])
+    moments = np.linalg.eigvalsh(numbers[0])
     if moments[0] + moments[1] < moments[2] * (1 + 1e-6):
         raise InputError(
             f"{where}: principal moments of inertia ({', '.join(f'{m:g}' for m in moments)}) are those of a flat body, "
             f"{moments[0]:g} + {moments[1]:g} = {moments[2]:g}; an estimate must start inside the triangle inequality"
         )
-    return np.asarray(parameters_from_inertia(jnp.asarray(inertia)))
+    # Numbers of the host stay such also where something else is being traced.
+    with jax.ensure_compile_time_eval():
+        return np.asarray(parameters_from_inertia(jnp.asarray(numbers[0])))
 
 
 def inertia_ratios(parameters: Array) -> Vector3:

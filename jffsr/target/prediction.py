@@ -81,16 +81,18 @@ def predict_grasp(
 ) -> GraspPrediction:
     """The grasp frame `horizon` s after the estimate, from its pose in the marker's frame (`Target.grasp_in_marker`).
 
+    Without process noise the target is free meanwhile, and the covariance only follows its motion.
+
     num_steps, of a quarter of a radian each at most, is found where the numbers are known; where they are traced or the
     estimate is a batch under vmap it must be given.
     """
     if num_steps is None:
         inertia = inertia_from_parameters(estimate.inertia_parameters)
         num_steps = steps_needed(inertia, estimate.angular_velocity_T, horizon)
-    noise = process_noise or ProcessNoise()
+    added = (process_noise or ProcessNoise()).covariance(horizon / num_steps)
 
     def step(now, _):
-        return predict_step(now, horizon / num_steps, noise, ORDER), None
+        return predict_step(now, horizon / num_steps, added, ORDER), None
 
     later, _ = jax.lax.scan(step, estimate, length=num_steps)
     position_M, quaternion_M = jnp.asarray(grasp_in_marker[0]), jnp.asarray(grasp_in_marker[1])

@@ -90,7 +90,8 @@ def target_motion(
 def steps_needed(inertia: Array, angular_velocity_T: Array, duration: float) -> int:
     """Steps of a quarter of a radian over `duration` s, at the fastest rate that the momentum allows, |J w|/J_min.
 
-    inertia (3, 3) in any unit, angular velocities (..., 3), rad/s, in its axes: of the fastest of them. Raises InputError where the numbers are traced or need over a million.
+    inertia (3, 3) in any unit; angular velocities (..., 3), rad/s, in its axes, of which the fastest decides.
+    Raises InputError where the numbers are traced or need over a million.
     """
     numbers = on_host(inertia, angular_velocity_T, jnp.asarray(duration))
     if numbers is None:
