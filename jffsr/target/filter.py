@@ -18,13 +18,15 @@ from scipy.stats import chi2
 from jffsr.errors import InputError
 from jffsr.target.acquisition import acquire
 from jffsr.target.camera import Camera, Measurements
-from jffsr.target.estimate import INERTIA, OFFSET, TargetEstimate
+from jffsr.target.estimate import INERTIA, OFFSET, RATE, TargetEstimate
 from jffsr.target.filter_steps import ProcessNoise, predict_step, update_step
 from jffsr.target.prior import TargetPrior
 from jffsr.types import Array
 
 # Order of the Taylor series over one sample interval: a turn of 0.1 rad leaves 1e-11.
 _ORDER = 8
+# The linearisation noise is stated for these deviations: rad/s, one, m.
+_RATE_DEVIATION, _INERTIA_DEVIATION, _OFFSET_DEVIATION = 1e-3, 0.1, 0.1
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,7 @@ class FilterSettings:
     acquisition: int = 100
     gate_probability: float = 0.999
     process_noise: ProcessNoise = field(default_factory=ProcessNoise)
-    linearisation_noise: ProcessNoise = field(
-        default_factory=lambda: ProcessNoise(1.2e-4, 5e-5, 2.4e-3, 1.2e-3)
-    )
+    linearisation_noise: ProcessNoise = field(default_factory=lambda: ProcessNoise(8e-5, 4.5e-5, 2e-3, 1e-3))
     lost_after: int = 10
 
     def __post_init__(self):
@@ -110,7 +110,7 @@ def filter_target(
             estimate, measured.position, measured.quaternion, measured.seen, noise, settings.gate
         )
         refused = jnp.where(used, 0, refused + measured.seen)
-        added = physical + settings.linearisation_noise.covariance(interval, *_unsureness(estimate, prior))
+        added = physical + settings.linearisation_noise.covariance(interval, *_neglected(estimate))
         following = predict_step(estimate, interval, added, _ORDER)
         return (following, refused), (estimate, residual, squared, used, refused)
 
@@ -118,16 +118,19 @@ def filter_target(
     return FilteredTarget(*course, lost=course[-1] >= settings.lost_after)
 
 
-def _unsureness(estimate: TargetEstimate, prior: TargetPrior) -> tuple[Array, Array]:
-    """How the products of two errors, which the filter neglects, have shrunk since the prior: of rotation, translation.
+def _neglected(estimate: TargetEstimate) -> tuple[Array, Array]:
+    """Sizes of the products of errors that the filter neglects, of rate and inertia and of rate and offset, squared.
 
-    An extended filter is linearised at ever new estimates, and so grows too sure of what it hardly sees: rate and
-    inertia together, and the offset. The noise that makes up for it fades as the inertia and the offset become known.
+    Units are deviations of 0.1 of the inertia's numbers, 0.1 m and 1 mrad/s.
+
+    An extended filter is linearised at ever new estimates, and so grows too sure of what it hardly sees. The noise that
+    makes up for it fades as rate, inertia and offset become known.
     """
     variance = jnp.diagonal(estimate.covariance)
-    inertia = jnp.mean(variance[INERTIA]) / prior.inertia_deviation**2
-    offset = jnp.mean(variance[OFFSET]) / prior.offset_deviation**2
-    return inertia**2, offset
+    inertia = jnp.mean(variance[INERTIA]) / _INERTIA_DEVIATION**2
+    offset = jnp.mean(variance[OFFSET]) / _OFFSET_DEVIATION**2
+    rate = jnp.mean(variance[RATE]) / _RATE_DEVIATION**2
+    return rate * inertia, rate * offset
 
 
 def expected_innovation_squared(settings: FilterSettings) -> float:

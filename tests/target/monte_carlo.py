@@ -13,16 +13,19 @@ from jffsr.target.estimate import error_of, true_estimate
 from jffsr.target.filter import filter_target
 from jffsr.target.grasp_frames import fixed_frame
 from jffsr.target.inertia_parameters import inertia_from_parameters
-from jffsr.target.prediction import convergence, prediction_error
+from jffsr.target.prediction import ConvergenceTolerances, convergence, prediction_error
 from jffsr.target.prior import draw_from_prior
 from jffsr.target.tumbling import target_motion
 
 GRASP = (jnp.array([0.2, -0.1, 0.05]), jnp.array([0.5, 0.5, 0.5, 0.5]))
 
 
-@partial(jax.jit, static_argnums=(0, 1, 3, 4, 5, 6))
-def simulate(camera, settings, prior, count, runs, horizon, every, seed):
-    """NEES, NIS, whether used, the last errors and deviations, and the predictions' errors and claims of many runs."""
+@partial(jax.jit, static_argnums=(0, 1, 3, 4, 5, 6, 8))
+def simulate(camera, settings, prior, count, runs, horizon, every, seed, factor=1.0):
+    """NEES, NIS, whether used, the last errors and deviations, and the predictions' errors and claims of many runs;
+    the tolerances of convergence are the standard ones times the factor."""
+    usual = ConvergenceTolerances()
+    tolerances = ConvergenceTolerances(*(factor * usual.sizes))
 
     def one(key):
         of_truth, of_camera = jax.random.split(key)
@@ -43,7 +46,7 @@ def simulate(camera, settings, prior, count, runs, horizon, every, seed):
         solved = jnp.linalg.solve(estimate.covariance, errors[..., None])[..., 0]
         nees = jnp.sum(errors * solved, axis=-1)
         some = jax.tree.map(lambda x: x[::every], estimate)
-        declared, prediction = convergence(some, horizon, max(1, int(horizon)), GRASP)
+        declared, prediction = convergence(some, horizon, max(1, int(horizon)), GRASP, None, tolerances)
 
         def miss(predicted):
             frame = fixed_frame(motion(predicted.time), target.marker_position + GRASP[0], GRASP[1])

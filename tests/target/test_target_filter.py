@@ -117,3 +117,29 @@ def test_too_few_poses_are_refused(followed):
     few = jax.tree.map(lambda x: x[:WINDOW], seen)
     with pytest.raises(InputError, match="20 poses were measured, and the acquisition alone takes 20"):
         filter_target(few, Camera(), TargetPrior.create(), SETTINGS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_two_hundred_random_targets_are_estimated_consistently(factor):
+    runs, horizon, every = 200, 5.0, 10
+    camera, settings = Camera().scaled(factor), FilterSettings()
+    found = simulate(camera, settings, TargetPrior.create(), 500, runs, horizon, every, 2, factor)
+    found = {name: np.asarray(value) for name, value in found.items()}
+    assert np.all(np.isfinite(found["nees"]))
+    assert not np.any(found["lost"])
+    _, nis, mean = shares_inside(found, settings, runs)
+    assert nis > 0.93
+    # The joint square of all twenty errors leaves its 95 % bounds, 19.1 to 20.9, by less than this.
+    assert np.all((mean > 16) & (mean < 24))
+    # Each error alone is as large as its deviation says.
+    ratio = np.sqrt(np.mean((found["error"] / found["deviation"]) ** 2, axis=0))
+    blocks = np.sqrt([np.mean(ratio[:, k] ** 2, axis=1) for k in np.split(np.arange(20), [3, 6, 11, 14, 17])])
+    assert np.all((blocks > 0.85) & (blocks < 1.2))
+    # Declared from the covariance alone, and right at that moment: every error of the prediction within its tolerance.
+    declared = found["declared"]
+    first, ever = declared.argmax(axis=1), declared.any(axis=1)
+    blocks = found["miss"][np.arange(runs), first].reshape(runs, 4, 3)
+    right = np.all(np.linalg.norm(blocks, axis=-1) <= factor * TOLERANCES, axis=1)
+    assert ever.mean() > 0.2
+    assert right[ever].mean() >= 0.95
