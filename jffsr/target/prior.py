@@ -22,8 +22,8 @@ class TargetPrior:
     """Means and standard deviations of what a camera does not see at once; position and attitude are wide open.
 
     angular_velocity_T (3,), rad/s, inertia_parameters (5,) and marker_offset_T (3,), m, in the axes of the marker;
-    velocity (3,), m/s, of the centre of mass in I; a deviation for each, of all its components. A deviation of 0.1 of
-    the inertia parameters spreads the second moments of mass by about a fifth either way. Much wider ones, or offsets
+    velocity (3,), m/s, of the centre of mass in I; a deviation for each, of all its components. A deviation of 0.05 of
+    the inertia parameters spreads the second moments of mass by about a tenth either way. Much wider ones, or offsets
     of half a metre, make the filter too sure of itself: its errors are then no longer nearly normal.
     """
 
@@ -44,9 +44,9 @@ class TargetPrior:
         velocity: Array = (0.0, 0.0, 0.0),
         marker_offset_T: Array = (0.0, 0.0, 0.0),
         angular_velocity_deviation: float = float(np.deg2rad(2.5)),
-        inertia_deviation: float = 0.1,
+        inertia_deviation: float = 0.05,
         velocity_deviation: float = 0.05,
-        offset_deviation: float = 0.1,
+        offset_deviation: float = 0.05,
     ) -> TargetPrior:
         """The checked prior: inertia (3, 3), or (3,) for its diagonal, in any unit.
 

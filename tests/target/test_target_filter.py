@@ -130,8 +130,10 @@ def test_two_hundred_random_targets_are_estimated_consistently(factor):
     assert not np.any(found["lost"])
     _, nis, mean = shares_inside(found, settings, runs)
     assert nis > 0.93
-    # The joint square of all twenty errors leaves its 95 % bounds, 19.1 to 20.9, by less than this.
-    assert np.all((mean > 16) & (mean < 24))
+    # The joint square of all twenty errors keeps below its upper bound, 20.9, but for chance, and in the end is under
+    # the lower one, 19.1: the covariance is then a little too large.
+    assert np.all((mean > 17) & (mean < 21.5))
+    assert np.mean(mean < 20.9) > 0.85
     # Each error alone is as large as its deviation says.
     ratio = np.sqrt(np.mean((found["error"] / found["deviation"]) ** 2, axis=0))
     blocks = np.sqrt([np.mean(ratio[:, k] ** 2, axis=1) for k in np.split(np.arange(20), [3, 6, 11, 14, 17])])
@@ -141,5 +143,5 @@ def test_two_hundred_random_targets_are_estimated_consistently(factor):
     first, ever = declared.argmax(axis=1), declared.any(axis=1)
     blocks = found["miss"][np.arange(runs), first].reshape(runs, 4, 3)
     right = np.all(np.linalg.norm(blocks, axis=-1) <= factor * TOLERANCES, axis=1)
-    assert ever.mean() > 0.2
+    assert ever.mean() > 0.6
     assert right[ever].mean() >= 0.95
