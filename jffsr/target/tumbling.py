@@ -69,7 +69,7 @@ def target_motion(
     if numbers is not None and not (np.isfinite(numbers[0]) and numbers[0] > 0):
         raise InputError(f"target motion: duration is {numbers[0]:g} s; a positive number is expected")
     if num_steps is None:
-        num_steps = steps_needed(target, initial_state, duration)
+        num_steps = steps_needed(target.inertia, initial_state.angular_velocity_T, duration)
     step = duration / num_steps
 
     inertia = jnp.asarray(target.inertia)
@@ -87,12 +87,13 @@ def target_motion(
     return TargetMotion(target, initial_state, jnp.asarray(duration, rates.dtype), quaternion, rates, turns)
 
 
-def steps_needed(target: Target, initial_state: TargetState, duration: float) -> int:
+def steps_needed(inertia: Array, angular_velocity_T: Array, duration: float) -> int:
     """Steps of a quarter of a radian over `duration` s, at the fastest rate that the momentum allows, |J w|/J_min.
 
-    For batched states, of the fastest of them. Raises InputError where the numbers are traced or need over a million.
+    inertia (3, 3) in any unit; angular velocities (..., 3), rad/s, in its axes, of which the fastest decides.
+    Raises InputError where the numbers are traced or need over a million.
     """
-    numbers = on_host(target.inertia, initial_state.angular_velocity_T, jnp.asarray(duration))
+    numbers = on_host(inertia, angular_velocity_T, jnp.asarray(duration))
     if numbers is None:
         raise InputError("target motion: num_steps must be given where inertia, rate or duration are traced")
     inertia, rate, duration = numbers

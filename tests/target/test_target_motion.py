@@ -197,5 +197,5 @@ def test_steps_are_as_many_as_the_momentum_asks_for():
     rest = np.zeros(3)
     state = TargetState.create(rest, rest, (1, 0, 0, 0), (0.1, 0, 0))
     # |J w|/J_min = 30 * 0.1/12 rad/s, a quarter of a radian a step.
-    assert steps_needed(target, state, 100.0) == 100
+    assert steps_needed(target.inertia, state.angular_velocity_T, 100.0) == 100
     assert target_motion(target, state, 100.0).num_steps == 100
