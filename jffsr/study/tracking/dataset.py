@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jffsr.optimizers.driver import Outcome
 from jffsr.study.tracking.building import TrackingTask
 from jffsr.study.tracking.schema import TrackingConfig
-
-if TYPE_CHECKING:
-    from jffsr.study.tracking.running import TrackedPath
+from jffsr.study.tracking.tracked_path import TrackedPath
 
 _SECOND = {"revolute": "rad", "prismatic": "m"}
 _MIXED = "m, rad"

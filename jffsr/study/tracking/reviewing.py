@@ -11,7 +11,8 @@ from jffsr.errors import InputError
 from jffsr.study.atomic import write_json
 from jffsr.study.reviewing import open_tracking
 from jffsr.study.tracking.building import build_tracker
-from jffsr.study.tracking.running import TUNED, track_task
+from jffsr.study.tracking.running import TUNED
+from jffsr.study.tracking.tracked_path import track_task
 from jffsr.tracking.mujoco_check import check_tracked
 from jffsr.tracking.mujoco_report import TrackedCheck
 

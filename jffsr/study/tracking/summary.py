@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,8 @@ from jffsr.optimizers.driver import Outcome
 from jffsr.study.summary import last_lines, versions
 from jffsr.study.tracking.building import TrackingTask
 from jffsr.study.tracking.schema import TrackingConfig
+from jffsr.study.tracking.tracked_path import TrackedPath
 from jffsr.tracking.outcome import TrackingCode
-
-if TYPE_CHECKING:
-    from jffsr.study.tracking.running import TrackedPath
 
 _IMPOSSIBLE = (TrackingCode.UNREACHABLE, TrackingCode.THROUGH_BASE, TrackingCode.NOT_FINITE)
 _NUMBERS = ("lambda_max", "epsilon", "damping", "threshold", "position_gain", "attitude_gain")
