@@ -44,6 +44,7 @@ def shares_inside(found, settings, runs):
     return np.mean((mean > low) & (mean < high)), np.mean(inside), mean
 
 
+@pytest.mark.slow
 def test_a_few_random_targets_are_estimated_consistently():
     runs = 16
     settings = FilterSettings(acquisition=60)

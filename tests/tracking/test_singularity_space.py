@@ -114,6 +114,7 @@ def test_a_direction_less_of_the_tool(wu):
     np.testing.assert_allclose(matrices[0], matrices[1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_tool_frame_says_the_same_of_a_plane(robots):
     robot = robots["hu_2011_planar2"]
     time = np.linspace(0, 1, 11)
