@@ -1,7 +1,7 @@
 """Compare the optimizers on robots: run what is missing, then write the page and its picture.
 
 Run it from the root of the repository: `make compare`, or `python -m experiments.comparison`. Runs are kept one by one
-beside the page; the same command goes on where it was stopped.
+in runs/ and, at the end, packed beside the page; the same command goes on where it was stopped.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from experiments.comparison.page import draw, tables
 from experiments.comparison.scenarios import SCENARIOS
 from experiments.comparison.searches import SEARCHES
-from experiments.comparison.work import read_runs, run_missing
+from experiments.comparison.work import pack, read_runs, run_missing, unpack
 from experiments.pages import fill
 
 
@@ -26,11 +26,14 @@ def main() -> None:
     parser.add_argument("--redraw", action="store_true", help="from the runs kept beside --out alone")
     arguments = parser.parse_args()
     page = Path(arguments.out)
-    kept = page.with_suffix(".jsonl")
+    kept, packed = Path("runs/benchmarks") / f"{page.stem}.jsonl", page.with_suffix(".jsonl.gz")
+    unpack(packed, kept)
     if not arguments.redraw:
         page.parent.mkdir(parents=True, exist_ok=True)
+        kept.parent.mkdir(parents=True, exist_ok=True)
         chosen = [s for s in SCENARIOS if s.name in arguments.scenarios.split(",")]
         run_missing(kept, chosen, SEARCHES, range(arguments.seeds), arguments.budget)
+        pack(kept, packed)
     runs, facts = read_runs(kept)
     fill(page, tables(runs, facts), "Optimizers on robots")
     draw(page.with_suffix(".png"), runs, SEARCHES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import time
@@ -19,6 +20,18 @@ from experiments.comparison.scenarios import Scenario
 from experiments.comparison.searches import MEMBERS, STARTS, Search
 from jffsr.optimizers.driver import Outcome, run
 from jffsr.planning.problem import Problem
+
+
+def unpack(packed: Path, kept: Path) -> None:
+    """Put the runs that stand packed beside the page where they are gone on with, unless some are there already."""
+    if packed.is_file() and not kept.is_file():
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_bytes(gzip.decompress(packed.read_bytes()))
+
+
+def pack(kept: Path, packed: Path) -> None:
+    """Pack the runs beside the page; the same runs give the same bytes."""
+    packed.write_bytes(gzip.compress(kept.read_bytes(), mtime=0))
 
 
 def run_missing(

@@ -11,7 +11,7 @@ from experiments import parametrisation
 from experiments.comparison.page import tables
 from experiments.comparison.scenarios import SCENARIOS
 from experiments.comparison.searches import MEMBERS, SEARCHES, STARTS
-from experiments.comparison.work import read_runs
+from experiments.comparison.work import pack, read_runs, unpack
 from experiments.pages import BEGIN, END, fill
 
 BUDGET, CHARGE = 5000, 3.5
@@ -68,3 +68,17 @@ def test_runs_are_read_as_they_were_kept_and_become_a_page(tmp_path):
     assert "old" not in text
     assert "| x | 1 | 1 |" in text
     assert "| y | 0 | 0 |" in text
+
+
+def test_packed_runs_come_back_but_never_over_newer_ones(tmp_path):
+    kept, packed, again = tmp_path / "runs.jsonl", tmp_path / "runs.jsonl.gz", tmp_path / "new" / "runs.jsonl"
+    kept.write_text('{"machine": 1}\n')
+    pack(kept, packed)
+    first = packed.read_bytes()
+    unpack(packed, again)
+    assert again.read_bytes() == kept.read_bytes()
+    kept.write_text('{"machine": 2}\n')
+    unpack(packed, kept)
+    assert kept.read_text() == '{"machine": 2}\n'
+    pack(again, packed)
+    assert packed.read_bytes() == first
