@@ -29,7 +29,11 @@ MEASURES = (PUBLISHED, FORCE, LEAST_SINGULAR_VALUE)
 
 
 def grasped_jacobian(
-    robot: Robot, state: State, grasp_T: Vector3, target_quaternion: Quaternion, end_effector: str | None = None
+    robot: Robot,
+    state: State,
+    grasp_T: Vector3,
+    target_quaternion: Quaternion,
+    end_effector: str | None = None,
 ) -> Matrix:
     """J_c (6, n): twist in I of the target's centre of mass per joint rate, the target held at grasp_T (3,), m, in T.
 

@@ -42,7 +42,9 @@ class BaseDisturbance:
         return smooth_norm(self._change(motion), smoothing.norm * self.scale)
 
     def _change(self, motion: Motion) -> Vector:
-        turn = quaternion_multiply(motion.base_quaternion[-1], quaternion_conjugate(motion.base_quaternion[0]))
+        turn = quaternion_multiply(
+            motion.base_quaternion[-1], quaternion_conjugate(motion.base_quaternion[0])
+        )
         moved = motion.base_position[-1] - motion.base_position[0]
         return jnp.concatenate([self.position * moved, self.attitude * turn[1:]])
 
@@ -69,9 +71,7 @@ class LostManipulability:
         state = State(motion.base_position[-1], motion.base_quaternion[-1], motion.joint_position[-1])
         duration = motion.time[-1]
         target = self.path.target_state(duration, duration)
-        jacobian = grasped_jacobian(
-            robot, state, self.path.position_T, target.quaternion, self.end_effector
-        )
+        jacobian = grasped_jacobian(robot, state, self.path.position_T, target.quaternion, self.end_effector)
         return -manipulability(jacobian, self.measure, self._wrench_I(duration), self.length)
 
     def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:

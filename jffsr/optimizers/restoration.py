@@ -135,7 +135,10 @@ class Restoration:
             best_value=jnp.where(improved, value, old.best_value),
         )
         best_position, best_value = better_of(
-            progress.best_position, progress.best_value, trials.best_position, finite_or_inf(trials.best_value)
+            progress.best_position,
+            progress.best_value,
+            trials.best_position,
+            finite_or_inf(trials.best_value),
         )
         progress = replace(
             progress,

@@ -84,7 +84,9 @@ def test_match_is_the_difference_of_both_frames(moved):
     np.testing.assert_allclose(match[:3], tool.position[-1] - origin[-1], atol=1e-12)
     np.testing.assert_allclose(match[6:], tool.twist[-1] - twist[-1], atol=1e-12)
     turned = quaternion_to_matrix(rotation_vector_to_quaternion(jnp.asarray(match[3:6])))
-    wanted, found = (np.asarray(quaternion_to_matrix(jnp.asarray(q[-1]))) for q in (quaternion, tool.quaternion))
+    wanted, found = (
+        np.asarray(quaternion_to_matrix(jnp.asarray(q[-1]))) for q in (quaternion, tool.quaternion)
+    )
     np.testing.assert_allclose(wanted @ turned, found, atol=1e-12)
 
 
@@ -117,7 +119,9 @@ def test_a_spline_ends_as_it_is_told(problem):
 
 def test_rates_at_the_grasp_move_the_tool_as_asked(problem):
     """The joints go on with the rates and accelerations found; differences of the tool's pose say what it does."""
-    state = jffsr.State(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.deg2rad([10, -30, 20, 30, 15, -40, 5.0]))
+    state = jffsr.State(
+        np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.deg2rad([10, -30, 20, 30, 15, -40, 5.0])
+    )
     twist = np.array([0.05, -0.02, 0.03, 0.04, -0.03, 0.02])
     acceleration = np.array([0.01, 0.02, -0.01, 0.005, 0.0, -0.004])
     step = 0.02
