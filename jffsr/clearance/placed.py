@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from jffsr.clearance.numerics import root
-from jffsr.spatial.components import Components, Rows, add, dot, rows_times
+from jffsr.spatial.components import Components, Rows, add, cross, dot, rows_times
 from jffsr.types import Array
 
 _SMALL = 1e-12
@@ -71,3 +71,9 @@ def unit(xp: ModuleType, vector: Components, length: Array) -> tuple[Components,
     long = length > _SMALL
     inverse = 1 / xp.where(long, length, 1.0)
     return tuple(inverse * x for x in vector), long
+
+
+def moved(solid: Placed, shift: Components, turn: Components) -> Placed:
+    """A solid after a small shift, m, and a small turn, rad, about its centre; in I, to the first order."""
+    columns = tuple(add(column, cross(turn, column)) for column in solid.columns)
+    return solid._replace(centre=add(solid.centre, shift), columns=columns)
