@@ -41,6 +41,8 @@ _HOME = {
     "bias_force": "jffsr.dynamics.equations_of_motion",
     "inverse_dynamics": "jffsr.dynamics.equations_of_motion",
     "forward_dynamics": "jffsr.dynamics.equations_of_motion",
+    "ClearanceModel": "jffsr.clearance.model",
+    "clearances": "jffsr.clearance.along_motion",
     "SinePolynomial": "jffsr.trajectories.sine_polynomial",
     "Polynomial": "jffsr.trajectories.polynomial",
     "ClampedBSpline": "jffsr.trajectories.bspline",

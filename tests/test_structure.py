@@ -26,6 +26,7 @@ ORDER = [
     "spatial",
     "robots",
     "dynamics",
+    "clearance",
     "trajectories",
     "rollouts",
     "crosscheck",

@@ -1,1 +1,1 @@
-"""Capture of a tumbling target: where the arm can grasp, when it should, and what happens at the grasp."""
+"""Capture of a tumbling target by a free-floating robot: when, from where, along which motion, and what follows."""

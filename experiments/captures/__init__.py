@@ -1,0 +1,1 @@
+"""A thousand random captures: what share is solved, and how fast."""

@@ -1,0 +1,73 @@
+"""Solids where their bodies are, in the inertial frame: components over (solids, ...) with any batch behind."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import NamedTuple
+
+from jffsr.clearance.numerics import root
+from jffsr.spatial.components import Components, Rows, add, dot, rows_times
+from jffsr.types import Array
+
+_SMALL = 1e-12
+
+
+class Placed(NamedTuple):
+    """Solids in I: centre, m, and the columns of their axes, components (k, ...); sizes as in Solid, (k, 1...)."""
+
+    centre: Components
+    columns: tuple[Components, Components, Components]
+    half: Components
+    radius: Array
+    slack: Array
+    box: Components
+    ball: Array
+    ellipsoid: Components
+
+    def along(self) -> Components:
+        """Half of a segment core, m, from its centre to its end."""
+        return tuple(self.half[2] * x for x in self.columns[2])
+
+
+def place(numbers, bodies, position: Components, rotation: Rows) -> Placed:
+    """Solids of the given `SolidNumbers` on the bodies (k,), of bodies at position (b, ...) turned by rotation."""
+    position = tuple(x[bodies] for x in position)
+    rotation = tuple(tuple(x[bodies] for x in row) for row in rotation)
+    behind = (slice(None),) + (None,) * (position[0].ndim - 1)
+
+    def vector(values: Array) -> Components:
+        return tuple(values[:, i][behind] for i in range(3))
+
+    return Placed(
+        centre=add(position, rows_times(rotation, vector(numbers.centre))),
+        columns=tuple(rows_times(rotation, vector(numbers.axes[:, :, i])) for i in range(3)),
+        half=vector(numbers.half),
+        radius=numbers.radius[behind],
+        slack=numbers.slack[behind],
+        box=vector(numbers.box),
+        ball=numbers.ball[behind],
+        ellipsoid=vector(numbers.ellipsoid),
+    )
+
+
+def extent(xp: ModuleType, direction: Components, solid: Placed) -> Array:
+    """Largest n . x, m, of a solid's points x about its centre, for unit directions n in I."""
+    along = [dot(direction, column) for column in solid.columns]
+    straight = sum(half * xp.abs(n) for half, n in zip(solid.box, along, strict=True))
+    square = sum((axis * n) ** 2 for axis, n in zip(solid.ellipsoid, along, strict=True))
+    return straight + solid.ball + root(xp, square)
+
+
+def gap_along(xp: ModuleType, direction: Components, away: Components, a: Placed, b: Placed) -> Array:
+    """How far apart, m, two solids are along unit directions; `away` leads from the centre of a to that of b.
+
+    The better one of the direction and its opposite; never more than their signed distance.
+    """
+    return xp.abs(dot(direction, away)) - extent(xp, direction, a) - extent(xp, direction, b)
+
+
+def unit(xp: ModuleType, vector: Components, length: Array) -> tuple[Components, Array]:
+    """Unit vectors, and where the length, m, is enough to have one; elsewhere the vector as it is."""
+    long = length > _SMALL
+    inverse = 1 / xp.where(long, length, 1.0)
+    return tuple(inverse * x for x in vector), long
