@@ -38,7 +38,8 @@ class CapabilityMap:
 
     origin (3,), m, the centre of the first cell; spacing (), m; share (nx, ny, nz), of all attitudes at a cell's
     centre; direction_share (nx, ny, nz, d), of the rolls about each of direction (d, 3), unit vectors of the tool's x
-    axis. robot, end_effector, rolls and self_clearance, whether postures with bodies in contact were refused, are static.
+    axis. robot, end_effector, rolls and self_clearance, whether postures with bodies in contact were refused, are
+    static.
     """
 
     origin: Array

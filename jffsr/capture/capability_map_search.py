@@ -36,15 +36,11 @@ CHUNK, CLEARANCE_CHUNK = 512, 64
 
 
 class Searcher:
-    """The compiled search of one arm; `create` draws its library of postures."""
+    """The search of one arm, whose library (l, n) of postures has its tool at poses (l, 3), (l, 4)."""
 
     def __init__(self, robot: Robot, chain: Chain, clear: Callable | None, library: np.ndarray, poses):
-        self.robot, self.chain, self.clear = robot, chain, clear
-        joints = jnp.asarray(library)
-        position, quaternion = poses
-        tolerance = TOLERANCE
-        length = float(chain.length)
-        self.library_size = len(library)
+        self.robot, self.chain, self.clear, self.library_size = robot, chain, clear, len(library)
+        joints, (position, quaternion), length = jnp.asarray(library), poses, float(chain.length)
 
         def improve(item):
             wanted, attitude, given, place = item
@@ -56,7 +52,7 @@ class Searcher:
             best = joints[place + jnp.argmin(away + turned)]
             start = jnp.where(place >= 0, best, given)
             found, errors = descend(chain, tuple(wanted), tuple(attitude), start, ITERATIONS)
-            return found, (errors[0] <= tolerance) & (errors[1] <= tolerance)
+            return found, (errors[0] <= TOLERANCE) & (errors[1] <= TOLERANCE)
 
         self._improve = improve
 
@@ -64,7 +60,7 @@ class Searcher:
     def create(
         cls, robot: Robot, chain: Chain, clearance: ClearanceModel | None, margin: float, seed: int
     ) -> Searcher:
-        """With a clearance model, postures count where all its distances, m, exceed the margin."""
+        """With a library drawn from the seed; a clearance model's distances, m, must all exceed the margin."""
         clear = None
         if clearance is not None:
             still = jnp.zeros((1, 3)), jnp.array([[1.0, 0.0, 0.0, 0.0]])
@@ -114,28 +110,35 @@ def _in_batches(function, batch, sizes: tuple[int, int], chunk: int):
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
 
 
+def search_poses(
+    searcher: Searcher, position: np.ndarray, quaternion: np.ndarray, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joint positions (k, n) for poses (k, 3), (k, 4) of the tool in B, and which of them were reached, (k,)."""
+    found = np.zeros((len(position), searcher.robot.num_joints))
+    reached = np.zeros(len(position), dtype=bool)
+    for _ in range(ROUNDS):
+        left = np.flatnonzero(~reached)
+        if not len(left):
+            break
+        places = random.integers(0, searcher.library_size - CANDIDATES, len(left))
+        q, met = searcher.solve(position[left], quaternion[left], found[left], places)
+        found[left[met]], reached[left[met]] = q[met], True
+    return found, reached
+
+
 def search_block(
     searcher: Searcher, grid: PoseGrid, quaternion: np.ndarray, cells: np.ndarray, seed: tuple[int, int]
 ) -> np.ndarray:
     """Which attitudes (a,) are reached in cells of these indices (c, 3): (c, a). Drawn from the seed alone."""
     random = np.random.default_rng(seed)
-    attitudes, n = len(quaternion), searcher.robot.num_joints
-    positions = grid.positions(cells)
-    rotations = grid.rotation.reshape(-1, 3, 3)
+    positions, rotations = grid.positions(cells), grid.rotation.reshape(-1, 3, 3)
     possible = within_last_joint(searcher.robot.name, searcher.chain, positions, rotations).reshape(-1)
-    found = np.zeros((len(possible), n))
+    position, attitude = np.repeat(positions, len(quaternion), axis=0), np.tile(quaternion, (len(cells), 1))
+    found = np.zeros((len(possible), searcher.robot.num_joints))
     reached = np.zeros(len(possible), dtype=bool)
-
-    def attempt(which: np.ndarray, starts: np.ndarray, places: np.ndarray) -> None:
-        q, met = searcher.solve(positions[which // attitudes], quaternion[which % attitudes], starts, places)
-        found[which[met]], reached[which[met]] = q[met], True
-
-    for _ in range(ROUNDS):
-        left = np.flatnonzero(possible & ~reached)
-        if not len(left):
-            break
-        places = random.integers(0, searcher.library_size - CANDIDATES, len(left))
-        attempt(left, np.zeros((len(left), n)), places)
+    found[possible], reached[possible] = search_poses(
+        searcher, position[possible], attitude[possible], random
+    )
     neighbours = _neighbours(cells, rotations)
     for _ in range(NEIGHBOUR_ROUNDS):
         left = np.flatnonzero(possible & ~reached)
@@ -145,12 +148,13 @@ def search_block(
         near = neighbours[left][np.arange(len(left)), np.argmax(draw, axis=1)]
         some = usable.any(axis=1)
         left, near = left[some], near[some]
-        before = reached.sum()
-        if len(left):
-            attempt(left, found[near], np.full(len(left), -1))
-        if reached.sum() == before:
+        if not len(left):
             break
-    return reached.reshape(len(cells), attitudes)
+        q, met = searcher.solve(position[left], attitude[left], found[near], np.full(len(left), -1))
+        found[left[met]], reached[left[met]] = q[met], True
+        if not met.any():
+            break
+    return reached.reshape(len(cells), -1)
 
 
 def _neighbours(cells: np.ndarray, rotations: np.ndarray) -> np.ndarray:
