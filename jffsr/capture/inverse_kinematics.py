@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jffsr.capture.inverse_kinematics_chain import Chain, chain_length, chain_to_tool, tool_pose, turn_between
+from jffsr.capture.inverse_kinematics_chain import Chain, chain_to_tool, tool_pose, turn_between
 from jffsr.capture.inverse_kinematics_step import limited_step
 from jffsr.compiling import program
 from jffsr.errors import InputError
@@ -89,32 +89,29 @@ def _solve(robot, position, quaternion, starts, tolerances, end_effector, iterat
 
     def one(item) -> JointSolutions:
         wanted, attitude, start = item
-        found, errors = descend(chain, robot, tuple(wanted), tuple(attitude), start, iterations)
+        found, errors = descend(chain, tuple(wanted), tuple(attitude), start, iterations)
         return JointSolutions(found, *errors, success(found, errors, limits, tolerances))
 
     return over_starts(one, position, quaternion, starts)
 
 
-def descend(chain: Chain, robot: Robot, position, quaternion, start: Array, iterations: int):
+def descend(chain: Chain, position, quaternion, start: Array, iterations: int):
     """Joint positions (n,) from one start, and what is left in position, m, and attitude, rad."""
-    lower, upper = jnp.asarray(robot.limits.position_lower), jnp.asarray(robot.limits.position_upper)
-    bounds = tuple((lower[j], upper[j]) for j in chain.joints)
-    length = chain_length(chain)
+    length = chain.length
 
-    def error(q):
+    def step(_, state):
+        q = state[0]
         pose = tool_pose(chain, q)
         away = tuple(a - b for a, b in zip(position, pose.position, strict=True))
-        return pose, (*away, *turn_between(quaternion, pose.quaternion))
+        left = (*away, *turn_between(quaternion, pose.quaternion))
+        following = limited_step(pose.rows, left, q, chain.lower, chain.upper, length)
+        return jax.lax.optimization_barrier((following, q, left))
 
-    def step(_, q):
-        pose, left = error(q)
-        return jax.lax.optimization_barrier(limited_step(pose.columns, left, q, bounds, length))
-
-    q = tuple(jnp.clip(start[j], *bound) for j, bound in zip(chain.joints, bounds, strict=True))
-    q = jax.lax.fori_loop(0, iterations, step, q)
-    _, left = error(q)
-    found = start.at[np.array(chain.joints)].set(jnp.stack(q))
-    return found, (_length(left[:3]), _length(left[3:]))
+    first = jnp.clip(start[chain.index], chain.lower, chain.upper)
+    # One round more than steps: the kinematics is compiled once, for the steps and for what is left after the last.
+    blank = (first[0] * 0,) * 6
+    _, q, left = jax.lax.fori_loop(0, iterations + 1, step, (first, first, blank))
+    return start.at[chain.index].set(q), (_length(left[:3]), _length(left[3:]))
 
 
 def _length(v) -> Array:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jffsr.capture.inverse_kinematics import (
     ITERATIONS,
@@ -23,7 +22,7 @@ from jffsr.capture.inverse_kinematics import (
     over_starts,
     success,
 )
-from jffsr.capture.inverse_kinematics_chain import Chain, chain_length, chain_to_tool, tool_pose, turn_between
+from jffsr.capture.inverse_kinematics_chain import Chain, chain_to_tool, tool_pose, turn_between
 from jffsr.capture.inverse_kinematics_step import limited_step
 from jffsr.compiling import program
 from jffsr.dynamics.base_mode import FLOATING, base_freedom
@@ -111,21 +110,33 @@ def _solve(
     def one(item) -> JointSolutions:
         wanted, attitude, start = item
         # Joints that do not move this tool stay where the robot has them.
-        start = state.joint_position.at[np.array(chain.joints)].set(start[np.array(chain.joints)])
+        start = state.joint_position.at[chain.index].set(start[chain.index])
         in_base = quaternion_to_matrix(turn).T @ (wanted - place)
         turned = quaternion_multiply(quaternion_conjugate(turn), attitude)
-        q, _ = descend(chain, robot, tuple(in_base), tuple(turned), start, still)
+        q, _ = descend(chain, tuple(in_base), tuple(turned), start, still)
 
-        def base_and_tool(q: Vector):
-            place, turn = _end_of_path(robot, state, q, momentum, duration, base_mode, num_steps)
-            return (place, turn), _tool(chain, place, turn, q)
+        def base_and_tool(joints: Vector):
+            goal = q.at[chain.index].set(joints)
+            base = _end_of_path(robot, state, goal, momentum, duration, base_mode, num_steps)
+            return base, _tool(chain, *base, joints)
 
-        def step(_, q: Vector) -> Vector:
-            return _step(chain, robot, lambda q: base_and_tool(q)[1], wanted, attitude, q)
+        def step(_, carried):
+            joints = carried[0]
+            base, (at, facing), rows = _derivative(base_and_tool, joints)
+            left = (*(wanted - at), *turn_between(tuple(attitude), tuple(facing)))
+            return (
+                limited_step(rows, left, joints, chain.lower, chain.upper, chain.length),
+                joints,
+                base,
+                left,
+            )
 
-        q = jax.lax.fori_loop(0, moving, step, q)
-        base, (at, facing) = base_and_tool(q)
-        errors = safe_norm(wanted - at), safe_norm(jnp.stack(turn_between(tuple(attitude), tuple(facing))))
+        joints = q[chain.index]
+        blank = (jnp.zeros_like(wanted), jnp.zeros_like(attitude)), (wanted[0] * 0,) * 6
+        # One round more than steps, as with the still base.
+        _, joints, base, left = jax.lax.fori_loop(0, moving + 1, step, (joints, joints, *blank))
+        q = q.at[chain.index].set(joints)
+        errors = safe_norm(jnp.stack(left[:3])), safe_norm(jnp.stack(left[3:]))
         return JointSolutions(q, *errors, success(q, errors, robot.limits, tolerances), *base)
 
     return over_starts(one, position, quaternion, starts, chunk=CHUNK)
@@ -139,23 +150,21 @@ def _end_of_path(robot, state, q, momentum, duration, base_mode, num_steps) -> t
     return motion.base_position[-1], motion.base_quaternion[-1]
 
 
-def _tool(chain: Chain, place: Vector3, turn: Quaternion, q: Vector) -> tuple[Vector3, Quaternion]:
-    pose = tool_pose(chain, tuple(q[j] for j in chain.joints))
+def _tool(chain: Chain, place: Vector3, turn: Quaternion, joints: Vector) -> tuple[Vector3, Quaternion]:
+    pose = tool_pose(chain, joints)
     at = place + quaternion_to_matrix(turn) @ jnp.stack(pose.position)
     return at, quaternion_multiply(turn, jnp.stack(pose.quaternion))
 
 
-def _step(chain: Chain, robot: Robot, tool, wanted: Vector3, attitude: Quaternion, q: Vector) -> Vector:
-    """One step by the derivative of the tool's pose at the end of the path."""
-    joints = np.array(chain.joints)
-    directions = jnp.eye(robot.num_joints)[joints]
-    (at, facing), (by_position, by_quaternion) = jax.vmap(
-        lambda d: jax.jvp(tool, (q,), (d,)), out_axes=(None, 0)
-    )(directions)
+def _derivative(base_and_tool, joints: Vector):
+    """Base and tool pose at the end of the path, and the rows (6 of (k,)) of the tool's twist by the joints there."""
+
+    def by(direction: Vector):
+        (base, tool), (_, moved) = jax.jvp(base_and_tool, (joints,), (direction,))
+        return base, tool, moved
+
+    base, (at, facing), (by_position, by_quaternion) = jax.vmap(by, out_axes=(None, None, 0))(
+        jnp.eye(joints.shape[0])
+    )
     spin = 2 * quaternion_multiply(by_quaternion, quaternion_conjugate(facing)[None])[:, 1:]
-    columns = tuple((*a, *b) for a, b in zip(by_position, spin, strict=True))
-    error = (*(wanted - at), *turn_between(tuple(attitude), tuple(facing)))
-    lower, upper = jnp.asarray(robot.limits.position_lower), jnp.asarray(robot.limits.position_upper)
-    bounds = tuple((lower[j], upper[j]) for j in chain.joints)
-    moved = limited_step(columns, error, tuple(q[joints]), bounds, chain_length(chain))
-    return q.at[joints].set(jnp.stack(moved))
+    return base, (at, facing), (*by_position.T, *spin.T)

@@ -10,49 +10,43 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from jffsr.types import Array
+from jffsr.types import Array, Vector
 
 DAMPING = 0.05
 """Squared damping per squared error, lengths in units of the arm's own."""
 LEAST_DAMPING = 1e-12
 LARGEST_STEP = 1.0
-"""Largest change of a joint in one step, rad, or m per length of the arm."""
+"""Largest change of a joint in one step, rad or m."""
 
 
 def limited_step(
-    columns: tuple[tuple[Array, ...], ...],
+    rows: tuple[Vector, ...],
     error: tuple[Array, ...],
-    q: tuple[Array, ...],
-    bounds: tuple[tuple[Array, Array], ...],
+    q: Vector,
+    lower: Vector,
+    upper: Vector,
     length: Array,
-) -> tuple[Array, ...]:
-    """Joint positions after one step.
+) -> Vector:
+    """Joint positions (k,) after one step.
 
-    columns, six numbers [linear; angular] for each joint, m and rad; error, what takes the tool to the wanted pose,
-    [m; rad]; q, rad or m; bounds, lower and upper for each; length, m, that counts as much as a radian.
+    rows (6 of (k,)), the Jacobian [linear; angular]; error, six numbers that take the tool to the wanted pose, m and
+    rad; q, lower and upper (k,), rad or m, the joints and their limits; length, m, that counts as much as a radian.
     """
     weight = 1 / length
     error = (*(weight * x for x in error[:3]), *error[3:])
-    columns = [(*(weight * x for x in column[:3]), *column[3:]) for column in columns]
-    pull = [_dot(column, error) for column in columns]
-    kept = [
-        jnp.where(((p > 0) & (x >= upper)) | ((p < 0) & (x <= lower)), 0.0, 1.0)
-        for p, x, (lower, upper) in zip(pull, q, bounds, strict=True)
-    ]
-    columns = [tuple(free * x for x in column) for free, column in zip(kept, columns, strict=True)]
+    rows = (*(weight * row for row in rows[:3]), *rows[3:])
+    pull = _dot(rows, error)
+    free = ~(((pull > 0) & (q >= upper)) | ((pull < 0) & (q <= lower)))
+    rows = tuple(jnp.where(free, row, 0.0) for row in rows)
+    rows = jax.lax.optimization_barrier(rows)
     damping = DAMPING * _dot(error, error) + LEAST_DAMPING
-    rows = list(zip(*columns, strict=True))
-    matrix = [[_dot(rows[r], rows[k]) + (damping if r == k else 0.0) for k in range(r + 1)] for r in range(6)]
-    matrix, columns = jax.lax.optimization_barrier((matrix, columns))
-    solution = jax.lax.optimization_barrier(_cholesky_solve(matrix, error))
-    step = [_dot(column, solution) for column in columns]
-    longest = step[0] * 0
-    for x in step:
-        longest = jnp.maximum(longest, jnp.abs(x))
-    shrink = LARGEST_STEP / jnp.maximum(longest, LARGEST_STEP)
-    return tuple(
-        jnp.clip(x + shrink * dx, lower, upper) for x, dx, (lower, upper) in zip(q, step, bounds, strict=True)
-    )
+    matrix = [
+        [jnp.sum(rows[r] * rows[k]) + (damping if r == k else 0.0) for k in range(r + 1)] for r in range(6)
+    ]
+    solution = jax.lax.optimization_barrier(_cholesky_solve(jax.lax.optimization_barrier(matrix), error))
+    step = _dot(rows, solution)
+    shrink = LARGEST_STEP / jnp.maximum(jnp.max(jnp.abs(step)), LARGEST_STEP)
+    return jnp.clip(q + shrink * step, lower, upper)
 
 
 def _dot(a, b) -> Array:

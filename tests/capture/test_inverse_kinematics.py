@@ -49,12 +49,12 @@ def test_the_batch_kinematics_is_the_readable_one(robots, name):
     q = jnp.linspace(-0.7, 0.9, robot.num_joints)
     kin = jffsr.kinematics(robot, jffsr.State(jnp.zeros(3), UNIT, q))
     chain = chain_to_tool(robot, end_effector)
-    pose = tool_pose(chain, tuple(q[j] for j in chain.joints))
+    pose = tool_pose(chain, q[chain.index])
     position, quaternion = jffsr.end_effector_pose(robot, kin, end_effector)
     np.testing.assert_allclose(jnp.stack(pose.position), position, atol=1e-14)
     assert apart(jnp.stack(pose.quaternion)[None], quaternion[None])[0] < 1e-14
     jacobian = jffsr.jacobians(robot, kin, end_effector)[1]
-    np.testing.assert_allclose(np.array(pose.columns).T, jacobian[:, list(chain.joints)], atol=1e-14)
+    np.testing.assert_allclose(np.array(pose.rows), jacobian[:, list(chain.joints)], atol=1e-14)
     rest = np.delete(np.asarray(jacobian), list(chain.joints), axis=1)
     assert not rest.any()
 
