@@ -34,8 +34,8 @@ class FilterSettings:
 
     acquisition: how many of the first poses are fitted together; gate_probability: share of good poses that the gate
     lets pass, by the chi-square distribution of the normalised squared innovation; process_noise, what disturbs the
-    target between two fits; refit_every: after how many poses all poses so far are fitted together anew; lost_after:
-    how many poses refused in a row mean that the track is lost.
+    target; refit_every: after how many poses all poses so far are fitted together anew, as those of a free target, so
+    never where there is process noise; lost_after: how many poses refused in a row mean that the track is lost.
     Raises InputError for numbers that make no sense.
     """
 
@@ -111,7 +111,8 @@ def filter_target(
         return (following, refused), (estimate, residual, squared, used, refused)
 
     # Unseen poses fill the last stretch.
-    length = settings.refit_every
+    free = settings.process_noise == ProcessNoise()
+    length = settings.refit_every if free else count - window
     num_stretches = -(-(count - window) // length)
     total = window + num_stretches * length
     poses = jax.tree.map(
