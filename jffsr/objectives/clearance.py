@@ -16,8 +16,8 @@ from jffsr.rollouts.motion import Motion
 from jffsr.spatial.safe import smooth_max
 from jffsr.types import Array
 
-# m; a miss of this much counts as 1.
-_GROSS = 0.1
+MISS = 0.1
+"""Clearance, m, whose lack counts as 1."""
 
 
 @jax.tree_util.register_dataclass
@@ -50,4 +50,4 @@ class Clearance:
         if callable(states):
             states = jax.vmap(states)(motion.time + self.begin)
         distances = clearances(self.model, robot, motion, states)
-        return (jnp.asarray(self.margin) + smooth_max(-jnp.asarray(distances), self.width, axis=1)) / _GROSS
+        return (jnp.asarray(self.margin) + smooth_max(-jnp.asarray(distances), self.width, axis=1)) / MISS
