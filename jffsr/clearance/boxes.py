@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 
 from jffsr.clearance.numerics import computed_once, held, largest, root, smooth_step
-from jffsr.clearance.placed import Placed, gap_along, unit
+from jffsr.clearance.placed import Placed, extent, extent_along_axis, gap_along, unit
 from jffsr.clearance.segments import box_to_segment
 from jffsr.spatial.components import (
     Components,
@@ -38,7 +38,11 @@ def box_box_distance(xp: ModuleType, a: Placed, b: Placed) -> Array:
     B. Boxes that overlap are parted the shortest way along a face's normal of either or a product of two edges.
     """
     away = subtract(b.centre, a.centre)
-    gaps = [gap_along(xp, column, away, a, b) for column in (*a.columns, *b.columns)]
+    gaps = []
+    for own, other in ((a, b), (b, a)):
+        for axis, column in enumerate(own.columns):
+            reach = extent_along_axis(axis, own) + extent(xp, column, other)
+            gaps.append(xp.abs(dot(column, away)) - reach)
     for one in a.columns:
         for other in b.columns:
             normal = cross(one, other)
@@ -65,7 +69,8 @@ def _way_from_edges(xp: ModuleType, a: Placed, b: Placed) -> tuple[Components, A
         return tuple(sum(factors[:, i] * sides[i][k] for i in range(3)) for k in range(3))
 
     centre = add(tuple(m[None] for m in middle), edges(_MIDDLES))
-    ways, lengths = box_to_segment(xp, centre, edges(_ALONG), tuple(h[None] for h in b.half))
+    found = box_to_segment(xp, centre, edges(_ALONG), tuple(h[None] for h in b.half))
+    ways, lengths = computed_once(xp, found)
     nearest = xp.argmin(held(xp, lengths), axis=0)[None]
     way = tuple(xp.take_along_axis(x, nearest, axis=0)[0] for x in ways)
     return rows_times(rows, way), xp.take_along_axis(lengths, nearest, axis=0)[0]

@@ -71,12 +71,12 @@ class ClearanceModel:
                 raise InputError("clearance: the target has no shape with the role 'collision'")
             by_body[target] = [solid_of(shape, target, False) for shape in shapes]
         pairs = body_pairs(topology, (b for b, solids in by_body.items() if solids), ignore)
-        model = cls.of_solids(robot.topology, by_body, pairs)
-        joined = always_touching(model, robot)
-        left = [pair for pair, touching in zip(pairs, joined, strict=True) if not touching]
-        if not left:
+        if pairs:
+            joined = always_touching(cls.of_solids(robot.topology, by_body, pairs), robot)
+            pairs = [pair for pair, touching in zip(pairs, joined, strict=True) if not touching]
+        if not pairs:
             raise InputError(f"clearance: robot '{robot.name}' has no two bodies with shapes that can meet")
-        return cls.of_solids(robot.topology, by_body, left)
+        return cls.of_solids(robot.topology, by_body, pairs)
 
     @classmethod
     def of_solids(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 from typing import NamedTuple
 
-from jffsr.clearance.numerics import root
+from jffsr.clearance.numerics import computed_once, root
 from jffsr.spatial.components import Components, Rows, add, cross, dot, rows_times
 from jffsr.types import Array
 
@@ -52,7 +52,9 @@ def place(numbers, bodies, position: Components, rotation: Rows) -> Placed:
 
 def extent(xp: ModuleType, direction: Components, solid: Placed) -> Array:
     """Largest n . x, m, of a solid's points x about its centre, for unit directions n in I."""
-    along = [dot(direction, column) for column in solid.columns]
+    # The best direction is often square to an axis. The sign of their product, which is rounding then, has to be the
+    # same wherever it is used, or derivatives that should cancel do not.
+    along = computed_once(xp, [dot(direction, column) for column in solid.columns])
     straight = sum(half * xp.abs(n) for half, n in zip(solid.box, along, strict=True))
     square = sum((axis * n) ** 2 for axis, n in zip(solid.ellipsoid, along, strict=True))
     return straight + solid.ball + root(xp, square)
@@ -64,6 +66,11 @@ def gap_along(xp: ModuleType, direction: Components, away: Components, a: Placed
     The better one of the direction and its opposite; never more than their signed distance.
     """
     return xp.abs(dot(direction, away)) - extent(xp, direction, a) - extent(xp, direction, b)
+
+
+def extent_along_axis(axis: int, solid: Placed) -> Array:
+    """The same along the solid's own axis of this number."""
+    return solid.box[axis] + solid.ball + solid.ellipsoid[axis]
 
 
 def unit(xp: ModuleType, vector: Components, length: Array) -> tuple[Components, Array]:
