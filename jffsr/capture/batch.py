@@ -145,7 +145,7 @@ class _Work:
     """The attempts that are still to be made, first starts first, and what became of those that were."""
 
     def __init__(self, starts: np.ndarray, tasks: np.ndarray):
-        count, each, size = starts.shape
+        count, each, _ = starts.shape
         self._starts, self._tasks = starts, tasks
         variant = np.array([np.sum(tasks[:k] == task) for k, task in enumerate(tasks)])
         order = np.argsort(variant, kind="stable")
