@@ -98,7 +98,10 @@ def planned(path: Path, seed: int, numbers: list[int], part: int, base_mode: str
             line = {"number": number, "seconds": seconds / len(batch), "stage": 1, **one}
             write_line(path, line)
             lines.append(line)
-        print(f"{len(lines)} of {len(numbers)}: {_share(lines):.4f} captured, {seconds:.1f} s a part", flush=True)
+        print(
+            f"{len(lines)} of {len(numbers)}: {_share(lines):.4f} captured, {seconds:.1f} s a part",
+            flush=True,
+        )
     return lines
 
 

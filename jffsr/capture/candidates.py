@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.capture.grasp_path import GraspPath
-from jffsr.capture.inverse_kinematics import random_starts
 from jffsr.capture.inverse_kinematics_floating import floating_inverse_kinematics
 from jffsr.clearance.model import ClearanceModel
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
@@ -62,13 +61,17 @@ def grasp_candidates(
     robot: Robot,
     path: GraspPath,
     initial_state: State,
+    starts: Array,
     clearance: ClearanceModel | None = None,
     settings: CandidateSettings | None = None,
     end_effector: str | None = None,
     momentum: Array | None = None,
     base_mode: str = "floating",
 ) -> GraspCandidates:
-    """The candidates of one target, for jit and vmap; settings are static. The robot starts at the path's `begin`."""
+    """The candidates of one target, for jit and vmap; settings are static.
+
+    The robot starts at the path's `begin`; inverse kinematics from its own joint positions and from `starts` (k, n).
+    """
     settings = settings or CandidateSettings()
     first, last = settings.window
     grid = jnp.arange(first, last + settings.step / 2, settings.step)
@@ -82,8 +85,7 @@ def grasp_candidates(
         values = jnp.where(jnp.abs(grid - grid[best]) < settings.apart, jnp.inf, values)
     time, criterion = jnp.stack(times), jnp.stack(criteria)
     position, quaternion, _ = jax.vmap(lambda t: path.frame(t, t))(time)
-    start = random_starts(robot, jax.random.key(settings.seed), settings.starts - 1)
-    start = jnp.concatenate([jnp.asarray(initial_state.joint_position)[None], start])
+    start = jnp.concatenate([jnp.asarray(initial_state.joint_position)[None], jnp.asarray(starts)])
     # With the base given way, how long the way takes counts only under momentum; one duration must do for all.
     found = floating_inverse_kinematics(
         robot,

@@ -19,6 +19,7 @@ from jffsr.capture.candidates import (
     least_clearance,
 )
 from jffsr.capture.grasp_path import GraspPath
+from jffsr.capture.inverse_kinematics import random_starts
 from jffsr.capture.outcome import CaptureCode, CaptureResult, explain_capture
 from jffsr.capture.problem import NUM_STEPS, capture_problem
 from jffsr.capture.starts import capture_starts
@@ -125,12 +126,14 @@ def plan_captures(
     other = first_unlike([(task.path, task.clearance) for task in tasks])
     if other is not None:
         raise InputError(f"task {other} differs from task 0 in more than numbers; plan it apart")
+    chosen = settings.candidates
+    drawn = random_starts(robot, jax.random.key(chosen.seed), chosen.starts - 1)
     with all_devices():
         candidates, free_at_start = jax.device_get(
             _candidates(
                 stacked([(task.path, task.clearance) for task in tasks]),
-                (robot, initial_state, momentum),
-                settings.candidates,
+                (robot, initial_state, drawn, momentum),
+                chosen,
                 end_effector,
                 base_mode,
             )
@@ -175,11 +178,13 @@ def stacked(trees: Sequence[Any]) -> Any:
 @program(static_argnums=(2, 3, 4))
 def _candidates(batch, shared, settings: CandidateSettings, end_effector, base_mode):
     """Candidates of each task, and whether its start is free of collision, (K,)."""
-    robot, state, momentum = shared
+    robot, state, starts, momentum = shared
 
     def one(item) -> tuple[GraspCandidates, Array]:
         path, model = item
-        found = grasp_candidates(robot, path, state, model, settings, end_effector, momentum, base_mode)
+        found = grasp_candidates(
+            robot, path, state, starts, model, settings, end_effector, momentum, base_mode
+        )
         gap = jnp.inf if model is None else least_clearance(model, robot, path, jnp.zeros(()), state)
         return found, gap > 0
 
