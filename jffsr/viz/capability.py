@@ -142,7 +142,7 @@ def draw_capability_space(
     )
     draw_solids(axes, solids, towards, 0.02 * np.ptp(corners, axis=0).max(), 3)
     figure.set_layout_engine("none")
-    axes.set_position((0.04, 0.02, 0.8, 0.88))
+    axes.set_position((0.03, -0.03, 0.81, 1.04))
     figure.suptitle(
         f"{capability.robot}: the far half of the map, cells of {1e2 * float(capability.spacing):.3g} cm",
         y=0.97,
