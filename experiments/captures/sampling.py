@@ -154,6 +154,11 @@ def motion_of(sample: Sample, duration: float = WINDOW[1] + 1.0):
         grasps={"handle": (sample.grasp_position, sample.grasp_quaternion)},
     )
     state = TargetState.create(sample.position, np.zeros(3), sample.quaternion, sample.rate)
+    return jax.device_get(_moving(target, state, duration))
+
+
+@jax.jit
+def _moving(target: Target, state: TargetState, duration: float):
     return target_motion(target, state, duration, MOTION_STEPS)
 
 

@@ -80,7 +80,7 @@ def restore_many(
     """Free numbers that keep the constraints of each problem, from the starts (K, s, k) in their order.
 
     Problems of one structure. Where task_of names for each the task it is a variant of, the others of a task are left
-    alone once one is solved. lanes run at once; a start is given up after most_steps. on_progress is told how many
+    alone once one is solved; the first start of each variant comes before all second starts. lanes run at once; a start is given up after most_steps. on_progress is told how many
     tasks are solved and how many are open. Raises InputError for problems or starts that do not go together.
     """
     problems, starts = list(problems), np.asarray(starts, dtype=float)
@@ -147,7 +147,9 @@ class _Work:
     def __init__(self, starts: np.ndarray, tasks: np.ndarray):
         count, each, size = starts.shape
         self._starts, self._tasks = starts, tasks
-        self._queue = deque((problem, start) for start in range(each) for problem in range(count))
+        variant = np.array([np.sum(tasks[:k] == task) for k, task in enumerate(tasks)])
+        order = np.argsort(variant, kind="stable")
+        self._queue = deque((int(problem), start) for start in range(each) for problem in order)
         self._solved: set[int] = set()
         self._kept = np.zeros(count, dtype=bool)
         self._free = starts[:, -1].copy()

@@ -33,4 +33,4 @@ def clearances(model: ClearanceModel, robot: Robot, motion: Any, target_states: 
     origins, rotations = computed_once(xp, (origins, rotations))
     position = tuple(xp.stack([origin[i] for origin in origins]) for i in range(3))
     rotation = tuple(tuple(xp.stack([r[i][k] for r in rotations]) for k in range(3)) for i in range(3))
-    return model.distances(xp, *computed_once(xp, (position, rotation)))
+    return model.of_components(xp, *computed_once(xp, (position, rotation)))

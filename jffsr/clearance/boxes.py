@@ -6,8 +6,8 @@ from types import ModuleType
 
 import numpy as np
 
-from jffsr.clearance.numerics import held, root, smooth_step
-from jffsr.clearance.placed import Placed, gap_along, unit
+from jffsr.clearance.numerics import computed_once, held, largest, root, smooth_step
+from jffsr.clearance.placed import Placed, extent, extent_along_axis, gap_along, unit
 from jffsr.clearance.segments import box_to_segment
 from jffsr.spatial.components import (
     Components,
@@ -38,21 +38,23 @@ def box_box_distance(xp: ModuleType, a: Placed, b: Placed) -> Array:
     B. Boxes that overlap are parted the shortest way along a face's normal of either or a product of two edges.
     """
     away = subtract(b.centre, a.centre)
-    gap = gap_along(xp, a.columns[0], away, a, b)
-    for column in (*a.columns[1:], *b.columns):
-        gap = xp.maximum(gap, gap_along(xp, column, away, a, b))
+    gaps = []
+    for own, other in ((a, b), (b, a)):
+        for axis, column in enumerate(own.columns):
+            reach = extent_along_axis(axis, own) + extent(xp, column, other)
+            gaps.append(xp.abs(dot(column, away)) - reach)
     for one in a.columns:
         for other in b.columns:
             normal = cross(one, other)
             length = root(xp, dot(normal, normal))
             usable = length > _PARALLEL
             direction = scale(1 / xp.where(usable, length, 1.0), normal)
-            gap = xp.maximum(gap, xp.where(usable, gap_along(xp, direction, away, a, b), gap))
-    way, length = _way_from_edges(xp, a, b)
+            gaps.append(xp.where(usable, gap_along(xp, direction, away, a, b), gaps[0]))
+    gap = largest(xp, gaps)
+    way, length = computed_once(xp, _way_from_edges(xp, a, b))
     direction, apart = unit(xp, way, length)
-    slack = BLEND * (a.slack + b.slack)
-    certain = smooth_step(xp, length / xp.maximum(slack, 1e-12))
-    more = xp.maximum(gap_along(xp, direction, away, a, b) - gap, 0.0)
+    certain = smooth_step(xp, length / (BLEND * (a.slack + b.slack) + 1e-12))
+    more = largest(xp, [gap_along(xp, direction, away, a, b) - gap, xp.zeros_like(gap)])
     return gap + xp.where(apart, certain * more, 0.0)
 
 
@@ -67,7 +69,8 @@ def _way_from_edges(xp: ModuleType, a: Placed, b: Placed) -> tuple[Components, A
         return tuple(sum(factors[:, i] * sides[i][k] for i in range(3)) for k in range(3))
 
     centre = add(tuple(m[None] for m in middle), edges(_MIDDLES))
-    ways, lengths = box_to_segment(xp, centre, edges(_ALONG), tuple(h[None] for h in b.half))
+    found = box_to_segment(xp, centre, edges(_ALONG), tuple(h[None] for h in b.half))
+    ways, lengths = computed_once(xp, found)
     nearest = xp.argmin(held(xp, lengths), axis=0)[None]
     way = tuple(xp.take_along_axis(x, nearest, axis=0)[0] for x in ways)
     return rows_times(rows, way), xp.take_along_axis(lengths, nearest, axis=0)[0]

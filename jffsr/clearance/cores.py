@@ -39,6 +39,6 @@ def _tightened(
     """
     around = length - a.radius - b.radius
     direction, apart = unit(xp, way, length)
-    more = xp.maximum(gap_along(xp, direction, away, a, b) - around, 0.0)
+    more = gap_along(xp, direction, away, a, b) - around
     certain = smooth_step(xp, length / (BLEND * (a.slack + b.slack) + 1e-12))
     return around + xp.where(apart, certain * more, 0.0)

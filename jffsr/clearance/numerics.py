@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
@@ -27,9 +28,9 @@ def computed_once(xp: ModuleType, tree: Any) -> Any:
     return jax.lax.optimization_barrier(tree) if xp is jnp else tree
 
 
-def held(xp: ModuleType, value: Array) -> Array:
-    """The same value as a constant of differentiation."""
-    return jax.lax.stop_gradient(value) if xp is jnp else value
+def held(xp: ModuleType, tree: Any) -> Any:
+    """The same values as constants of differentiation."""
+    return jax.lax.stop_gradient(tree) if xp is jnp else tree
 
 
 def root(xp: ModuleType, square: Array) -> Array:
@@ -38,12 +39,36 @@ def root(xp: ModuleType, square: Array) -> Array:
     return xp.where(positive, xp.sqrt(xp.where(positive, square, 1.0)), 0.0)
 
 
+def larger(xp: ModuleType, a: Array, b: Array | float) -> Array:
+    """The larger one, elementwise.
+
+    The derivative of `jnp.maximum` compares both with the result: a compiler that computes one of them again, rounded
+    differently, finds neither, and the derivative is zero. So is that of `jnp.minimum` and of `jnp.clip`.
+    """
+    return xp.where(a > b, a, b)
+
+
+def smaller(xp: ModuleType, a: Array, b: Array | float) -> Array:
+    """The smaller one, elementwise."""
+    return xp.where(a < b, a, b)
+
+
+def largest(xp: ModuleType, values: Sequence[Array]) -> Array:
+    """The largest of several, elementwise, of which any two may be equal."""
+    # Compared again for the derivative by each, numbers computed again might come out in another order, and two of
+    # them, or none, be taken for the largest.
+    found, *others = computed_once(xp, list(values))
+    for other in others:
+        found = larger(xp, found, other)
+    return found
+
+
 def clipped(xp: ModuleType, x: Array, bound: Array | float) -> Array:
     """x within [-bound, bound]."""
-    return xp.maximum(xp.minimum(x, bound), -bound)
+    return larger(xp, smaller(xp, x, bound), -bound)
 
 
 def smooth_step(xp: ModuleType, x: Array) -> Array:
     """0 below 0, 1 above 1, and a cubic with level ends in between."""
-    x = xp.maximum(xp.minimum(x, 1.0), 0.0)
+    x = larger(xp, smaller(xp, x, 1.0), 0.0)
     return x * x * (3 - 2 * x)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import ModuleType
 from typing import NamedTuple
 
-from jffsr.clearance.numerics import root
-from jffsr.spatial.components import Components, Rows, add, dot, rows_times
+from jffsr.clearance.numerics import computed_once, root
+from jffsr.spatial.components import Components, Rows, add, cross, dot, rows_times
 from jffsr.types import Array
 
 _SMALL = 1e-12
@@ -52,7 +52,9 @@ def place(numbers, bodies, position: Components, rotation: Rows) -> Placed:
 
 def extent(xp: ModuleType, direction: Components, solid: Placed) -> Array:
     """Largest n . x, m, of a solid's points x about its centre, for unit directions n in I."""
-    along = [dot(direction, column) for column in solid.columns]
+    # The best direction is often square to an axis. The sign of their product, which is rounding then, has to be the
+    # same wherever it is used, or derivatives that should cancel do not.
+    along = computed_once(xp, [dot(direction, column) for column in solid.columns])
     straight = sum(half * xp.abs(n) for half, n in zip(solid.box, along, strict=True))
     square = sum((axis * n) ** 2 for axis, n in zip(solid.ellipsoid, along, strict=True))
     return straight + solid.ball + root(xp, square)
@@ -66,8 +68,19 @@ def gap_along(xp: ModuleType, direction: Components, away: Components, a: Placed
     return xp.abs(dot(direction, away)) - extent(xp, direction, a) - extent(xp, direction, b)
 
 
+def extent_along_axis(axis: int, solid: Placed) -> Array:
+    """The same along the solid's own axis of this number."""
+    return solid.box[axis] + solid.ball + solid.ellipsoid[axis]
+
+
 def unit(xp: ModuleType, vector: Components, length: Array) -> tuple[Components, Array]:
     """Unit vectors, and where the length, m, is enough to have one; elsewhere the vector as it is."""
     long = length > _SMALL
     inverse = 1 / xp.where(long, length, 1.0)
     return tuple(inverse * x for x in vector), long
+
+
+def moved(solid: Placed, shift: Components, turn: Components) -> Placed:
+    """A solid after a small shift, m, and a small turn, rad, about its centre; in I, to the first order."""
+    columns = tuple(add(column, cross(turn, column)) for column in solid.columns)
+    return solid._replace(centre=add(solid.centre, shift), columns=columns)

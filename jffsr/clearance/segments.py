@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from jffsr.clearance.numerics import clipped, held, root
+from jffsr.clearance.numerics import clipped, computed_once, held, larger, largest, root, smaller
 from jffsr.spatial.components import Components, add, cross, dot, scale, subtract
 from jffsr.types import Array
 
 # Squares of lengths, m^2, and of sines: below them a segment is a point, two are parallel.
 _POINT, _PARALLEL = 1e-30, 1e-24
+# m, further than anything overlaps.
+_NEVER = 1e9
 
 
 def between_segments(xp: ModuleType, away: Components, a: Components, b: Components) -> Components:
@@ -18,7 +20,7 @@ def between_segments(xp: ModuleType, away: Components, a: Components, b: Compone
     Lumelsky's clamping of the unclamped solution (Ericson 2005, section 5.1.9). Products of cross products take the
     place of differences of products, which would lose nearly parallel segments to rounding.
     """
-    aa, bb = xp.maximum(dot(a, a), _POINT), xp.maximum(dot(b, b), _POINT)
+    aa, bb = larger(xp, dot(a, a), _POINT), larger(xp, dot(b, b), _POINT)
     ab, pa, pb = dot(a, b), dot(away, a), dot(away, b)
     normal = cross(a, b)
     square = dot(normal, normal)
@@ -41,8 +43,8 @@ def box_to_segment(
     """
     point = _nearest_place(xp, centre, along, half)
     outside = tuple(_beyond(xp, c + point * u, h) for c, u, h in zip(centre, along, half, strict=True))
-    length = root(xp, dot(outside, outside))
-    return outside, xp.where(length > 0, length, _depth(xp, centre, along, half))
+    length, depth = computed_once(xp, (root(xp, dot(outside, outside)), _depth(xp, centre, along, half)))
+    return outside, xp.where(length > 0, length, depth)
 
 
 def _beyond(xp: ModuleType, x: Array, half: Array) -> Array:
@@ -57,39 +59,32 @@ def _nearest_place(xp: ModuleType, centre: Components, along: Components, half: 
     def slope(t: Array) -> Array:
         return sum(u * _beyond(xp, c + t * u, h) for c, u, h in axes)
 
-    first, last = slope(-1.0), slope(1.0)
-    inside = (first < 0) & (last > 0)
-    low, low_slope = xp.zeros_like(first) - 1.0, first
-    high, high_slope = xp.zeros_like(first) + 1.0, last
+    crossings = []
     for c, u, h in axes:
         moving = xp.abs(u) > _POINT
         inverse = 1 / xp.where(moving, u, 1.0)
-        for side in (-h, h):
-            t = clipped(xp, (side - c) * inverse, 1.0)
-            here = slope(t)
-            before = (here <= 0) & (t > low)
-            low, low_slope = xp.where(before, t, low), xp.where(before, here, low_slope)
-            after = (here >= 0) & (t < high)
-            high, high_slope = xp.where(after, t, high), xp.where(after, here, high_slope)
-    rise = high_slope - low_slope
-    share = xp.where(rise > 0, -low_slope / xp.where(rise > 0, rise, 1.0), 0.5)
-    bracketed = low + share * (high - low)
-    place = held(xp, xp.where(inside, bracketed, xp.where(last <= 0, 1.0, -1.0)))
-    # One step of Newton's method from there moves nothing, and has the derivative of the nearest place.
-    stiffness = sum(xp.where(xp.abs(c + place * u) > h, u * u, 0.0) for c, u, h in axes)
-    stiff = inside & (stiffness > _POINT)
-    return place - xp.where(stiff, slope(place) / xp.where(stiff, stiffness, 1.0), 0.0)
+        crossings += [clipped(xp, (side - c) * inverse, 1.0) for side in (-h, h)]
+    low, high = -1.0, 1.0
+    for t in computed_once(xp, held(xp, crossings)):
+        here = slope(t)
+        low = xp.where(here <= 0, larger(xp, low, t), low)
+        high = xp.where(here >= 0, smaller(xp, high, t), high)
+    # No crossing lies between the two, so that the slope is straight there: one step of Newton's method is exact, and
+    # has the derivative of the nearest place.
+    middle = held(xp, computed_once(xp, 0.5 * (low + high)))
+    stiffness = sum(xp.where(xp.abs(c + middle * u) > h, u * u, 0.0) for c, u, h in axes)
+    stiff = stiffness > _POINT
+    step = slope(middle) / xp.where(stiff, stiffness, 1.0)
+    return clipped(xp, middle - xp.where(stiff, step, 0.0), 1.0)
 
 
 def _depth(xp: ModuleType, centre: Components, along: Components, half: Components) -> Array:
     """Signed distance of a crossing segment and box: the largest gap over the separating axes, negative."""
-    gap = xp.abs(centre[0]) - half[0] - xp.abs(along[0])
-    for i in (1, 2):
-        gap = xp.maximum(gap, xp.abs(centre[i]) - half[i] - xp.abs(along[i]))
+    gaps = [xp.abs(c) - h - xp.abs(u) for c, u, h in zip(centre, along, half, strict=True)]
     for j, k in ((1, 2), (2, 0), (0, 1)):
         length = root(xp, along[j] ** 2 + along[k] ** 2)
         usable = length > 1e-9
         reach = half[j] * xp.abs(along[k]) + half[k] * xp.abs(along[j])
         over = xp.abs(centre[k] * along[j] - centre[j] * along[k]) - reach
-        gap = xp.maximum(gap, xp.where(usable, over / xp.where(usable, length, 1.0), gap))
-    return gap
+        gaps.append(xp.where(usable, over / xp.where(usable, length, 1.0), -_NEVER))
+    return largest(xp, gaps)

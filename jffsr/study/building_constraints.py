@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from jffsr.clearance.model import ClearanceModel
 from jffsr.errors import InputError
+from jffsr.objectives.clearance import MISS, Clearance
 from jffsr.objectives.constraints import BaseExcursion, Constraint, FinalAttitude, joint_limits
 from jffsr.objectives.torque_terms import TorqueLimit
 from jffsr.robots.robot import Robot
@@ -34,4 +36,15 @@ def build_constraints(config: PlanningConfig, robot: Robot) -> tuple[Constraint,
                 f"give limits.torque"
             )
         found.append(TorqueLimit(limit, tolerance=np.asarray(wanted.torque_limit.tolerance)))
+    if wanted.clearance is not None:
+        found.append(_clearance(config, robot))
     return tuple(found)
+
+
+def _clearance(config: PlanningConfig, robot: Robot) -> Clearance:
+    try:
+        model = ClearanceModel.create(robot)
+    except InputError as error:
+        raise InputError(f"{config.where('constraints.clearance')}: {error}") from error
+    wanted = config.constraints.clearance
+    return Clearance(model, np.asarray(wanted.margin), tolerance=np.asarray(wanted.tolerance / MISS))

@@ -13,6 +13,7 @@ from jffsr.study.schema_task import Quaternion
 
 Flag = Annotated[bool, flag()]
 Positive = Annotated[float, number(gt=0)]
+NotNegative = Annotated[float, number(ge=0)]
 Angle = Annotated[float, number(ge=-180, le=180, unit="deg", instead=" or null")]
 AngleRad = Annotated[float, number(ge=-3.1416, le=3.1416, unit="rad", instead=" or null")]
 
@@ -79,6 +80,13 @@ class TorqueLimit(Section):
     tolerance: Positive = 1e-3  # relative to the limit
 
 
+class Clearance(Section):
+    """All bodies of the robot that are no neighbours stay `margin`, m, apart at the motion's samples."""
+
+    margin: NotNegative = 0.02
+    tolerance: Positive = 1e-4  # m
+
+
 class Constraints(Section):
     """Equalities and inequalities on the motion."""
 
@@ -86,3 +94,4 @@ class Constraints(Section):
     joint_limits: JointLimits | None = None
     base_excursion: BaseExcursion | None = None
     torque_limit: TorqueLimit | None = None
+    clearance: Clearance | None = None

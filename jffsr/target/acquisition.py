@@ -8,11 +8,8 @@ out.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from jffsr.spatial.rotation import (
     quaternion_conjugate,
@@ -20,8 +17,8 @@ from jffsr.spatial.rotation import (
     quaternion_to_rotation_vector,
 )
 from jffsr.target.camera import Measurements
-from jffsr.target.estimate import NUM_ERRORS, TargetEstimate, corrected
-from jffsr.target.filter_steps import MEASURED, advance, innovation
+from jffsr.target.estimate import TargetEstimate, corrected
+from jffsr.target.least_squares import FitPass, fit_pass
 from jffsr.target.prior import TargetPrior
 from jffsr.types import Array, Matrix, Scalar
 
@@ -30,45 +27,31 @@ _ROBUST_PASSES, _GATED_PASSES = 6, 3
 _FEW = 30
 # Square of the normalised residual, of six numbers, from which it counts less: 95 % lie below.
 _HUBER = 12.59
-# Keeps the normal equations regular where no pose was seen at all; nothing beside any pose.
-_VAGUE = 1e-8 * np.eye(NUM_ERRORS)
 
 
 def acquire(
     measurements: Measurements, interval: float, prior: TargetPrior, noise: Matrix, gate: float, order: int
-) -> TargetEstimate:
-    """The estimate one interval after the last of a few poses (W, ...) with noise of covariance (6, 6).
+) -> tuple[TargetEstimate, Array]:
+    """The most probable estimate at the first of a few poses (W, ...) with noise of covariance (6, 6), and which of
+    them (W,) it trusts.
 
     Disturbances of the target are neglected over so short a time. Poses whose normalised squared residual is beyond
     the gate are left out.
     """
     first = prior.at_pose(*_middle_pose(measurements), measurements.time[0])
-    weight_matrix = jnp.linalg.inv(noise)
 
-    def follow(carry, measured):
-        estimate, transition = carry
-        residual = innovation(estimate, measured.position, measured.quaternion)
-        moved, step = advance(estimate, interval, order)
-        return (moved, step @ transition), (residual, MEASURED @ transition)
+    def one_pass(start: TargetEstimate, phase: Scalar, until: Scalar) -> FitPass:
+        def weigh(_, squared: Array) -> Array:
+            robust = jnp.minimum(1.0, jnp.sqrt(_HUBER / jnp.maximum(squared, _HUBER)))
+            return jnp.where(phase == _ROBUST, robust, squared <= gate)
+
+        return fit_pass(start, measurements, until, weigh, interval, prior, noise, order)
 
     def improve(start: TargetEstimate, stage: tuple[Array, Array]):
-        phase, until = stage
-        end, (residual, rows) = jax.lax.scan(follow, (start, jnp.eye(NUM_ERRORS)), measurements)
-        squared = jnp.einsum("ki,ij,kj->k", residual, weight_matrix, residual)
-        robust = jnp.minimum(1.0, jnp.sqrt(_HUBER / jnp.maximum(squared, _HUBER)))
-        weight = jnp.where(phase == _ROBUST, robust, squared <= gate) * measurements.seen
-        weight = weight * (jnp.arange(len(weight)) < until)
-        weighed = weight[:, None, None] * jnp.einsum("kir,ij->krj", rows, weight_matrix)
-        prior_residual = prior.normalised_residual(start)
-        prior_rows = -jax.jacfwd(lambda error: prior.normalised_residual(corrected(start, error)))(
-            jnp.zeros(NUM_ERRORS)
-        )
-        matrix = prior_rows.T @ prior_rows + jnp.einsum("krj,kjs->rs", weighed, rows) + _VAGUE
-        vector = prior_rows.T @ prior_residual + jnp.einsum("krj,kj->r", weighed, residual)
-        error = jnp.where(phase == _DONE, 0.0, jnp.linalg.solve(matrix, vector))
-        return corrected(start, error), (*end, matrix)
+        found = one_pass(start, *stage)
+        return corrected(start, jnp.where(stage[0] == _DONE, 0.0, found.correction)), found.squared
 
-    # The last pass corrects nothing more: it gives the covariance and the end of the window.
+    # The last pass corrects nothing more: it tells the outliers.
     count = len(measurements.time)
     few = min(count, _FEW)
     stages = [(_ROBUST, few)] * _ROBUST_PASSES + [(_GATED, few)] * _GATED_PASSES
@@ -77,9 +60,8 @@ def acquire(
         stages += [(_GATED, few)] * (2 if few < count else 4)
     stages.append((_DONE, count))
     phases = tuple(jnp.array(column) for column in zip(*stages, strict=True))
-    _, passes = jax.lax.scan(improve, first, phases)
-    last, transition, matrix = jax.tree.map(lambda x: x[-1], passes)
-    return replace(last, covariance=transition @ jnp.linalg.inv(matrix) @ transition.T)
+    start, squared = jax.lax.scan(improve, first, phases)
+    return start, squared[-1] <= gate
 
 
 def _middle_pose(measurements: Measurements) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ axes, which Aghili estimates beside two ratios, is in the five numbers of the in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -18,15 +18,14 @@ from scipy.stats import chi2
 from jffsr.errors import InputError
 from jffsr.target.acquisition import acquire
 from jffsr.target.camera import Camera, Measurements
-from jffsr.target.estimate import INERTIA, OFFSET, RATE, TargetEstimate
+from jffsr.target.estimate import TargetEstimate
 from jffsr.target.filter_steps import ProcessNoise, predict_step, update_step
 from jffsr.target.prior import TargetPrior
+from jffsr.target.refitting import refit
 from jffsr.types import Array
 
 # Order of the Taylor series over one sample interval: a turn of 0.1 rad leaves 1e-11.
 _ORDER = 8
-# The linearisation noise is stated for these deviations: rad/s, one, m.
-_RATE_DEVIATION, _INERTIA_DEVIATION, _OFFSET_DEVIATION = 1e-3, 0.1, 0.1
 
 
 @dataclass(frozen=True)
@@ -35,19 +34,19 @@ class FilterSettings:
 
     acquisition: how many of the first poses are fitted together; gate_probability: share of good poses that the gate
     lets pass, by the chi-square distribution of the normalised squared innovation; process_noise, what disturbs the
-    target; linearisation_noise, what makes up for products of errors that the filter neglects, and fades as inertia and
-    offset become known; lost_after: how many poses refused in a row mean that the track is lost.
+    target; refit_every: after how many poses all poses so far are fitted together anew, as those of a free target, so
+    never where there is process noise; lost_after: how many poses refused in a row mean that the track is lost.
     Raises InputError for numbers that make no sense.
     """
 
     acquisition: int = 100
     gate_probability: float = 0.999
     process_noise: ProcessNoise = field(default_factory=ProcessNoise)
-    linearisation_noise: ProcessNoise = field(default_factory=lambda: ProcessNoise(8e-5, 4.5e-5, 2e-3, 1e-3))
+    refit_every: int = 25
     lost_after: int = 10
 
     def __post_init__(self):
-        for what in ("acquisition", "lost_after"):
+        for what in ("acquisition", "refit_every", "lost_after"):
             if not getattr(self, what) >= 1:
                 raise InputError(f"target filter: {what} is {getattr(self, what)}; 1 or more is expected")
         if not 0 < self.gate_probability < 1:
@@ -98,11 +97,9 @@ def filter_target(
         )
     noise = jnp.asarray(camera.covariance)
     interval = 1 / camera.rate
-    early, late = (
-        jax.tree.map(lambda x, k=k: x[k], measurements) for k in (slice(window), slice(window, None))
-    )
-    physical = settings.process_noise.covariance(interval)
-    start = acquire(early, interval, prior, noise, settings.gate, _ORDER)
+    early = jax.tree.map(lambda x: x[:window], measurements)
+    start, trusted = acquire(early, interval, prior, noise, settings.gate, _ORDER)
+    added = settings.process_noise.covariance(interval)
 
     def step(carry, measured):
         estimate, refused = carry
@@ -110,27 +107,32 @@ def filter_target(
             estimate, measured.position, measured.quaternion, measured.seen, noise, settings.gate
         )
         refused = jnp.where(used, 0, refused + measured.seen)
-        added = physical + settings.linearisation_noise.covariance(interval, *_neglected(estimate))
         following = predict_step(estimate, interval, added, _ORDER)
         return (following, refused), (estimate, residual, squared, used, refused)
 
-    _, course = jax.lax.scan(step, (start, jnp.zeros((), int)), late)
+    # Unseen poses fill the last stretch.
+    free = settings.process_noise == ProcessNoise()
+    length = settings.refit_every if free else count - window
+    num_stretches = -(-(count - window) // length)
+    total = window + num_stretches * length
+    poses = jax.tree.map(
+        lambda x: jnp.concatenate([x, jnp.repeat(x[-1:], total - count, axis=0)]), measurements
+    )
+    poses = replace(poses, seen=poses.seen.at[count:].set(False))
+    trusted = jnp.zeros(total, bool).at[:window].set(trusted)
+
+    def stretch(carry, place):
+        start, trusted, refused = carry
+        start, estimate = refit(start, poses, place, trusted, interval, prior, noise, _ORDER)
+        piece = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, place, length), poses)
+        (_, refused), course = jax.lax.scan(step, (estimate, refused), piece)
+        trusted = jax.lax.dynamic_update_slice_in_dim(trusted, course[3], place, 0)
+        return (start, trusted, refused), course
+
+    places = window + length * jnp.arange(num_stretches)
+    _, course = jax.lax.scan(stretch, (start, trusted, jnp.zeros((), int)), places)
+    course = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:])[: count - window], course)
     return FilteredTarget(*course, lost=course[-1] >= settings.lost_after)
-
-
-def _neglected(estimate: TargetEstimate) -> tuple[Array, Array]:
-    """Sizes of the products of errors that the filter neglects, of rate and inertia and of rate and offset, squared.
-
-    Units are deviations of 0.1 of the inertia's numbers, 0.1 m and 1 mrad/s.
-
-    An extended filter is linearised at ever new estimates, and so grows too sure of what it hardly sees. The noise that
-    makes up for it fades as rate, inertia and offset become known.
-    """
-    variance = jnp.diagonal(estimate.covariance)
-    inertia = jnp.mean(variance[INERTIA]) / _INERTIA_DEVIATION**2
-    offset = jnp.mean(variance[OFFSET]) / _OFFSET_DEVIATION**2
-    rate = jnp.mean(variance[RATE]) / _RATE_DEVIATION**2
-    return rate * inertia, rate * offset
 
 
 def expected_innovation_squared(settings: FilterSettings) -> float:

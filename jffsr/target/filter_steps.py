@@ -52,21 +52,20 @@ class ProcessNoise:
             if not (np.isfinite(value) and value >= 0):
                 raise InputError(f"process noise: {what} is {value:g}; zero or more is expected")
 
-    def covariance(self, duration: Scalar, rotational: Scalar = 1.0, translational: Scalar = 1.0) -> Matrix:
-        """What they add to the covariance (20, 20) over a short `duration`, s; the powers of angular acceleration and
-        inertia and those of linear acceleration and offset times a factor each."""
+    def covariance(self, duration: Scalar) -> Matrix:
+        """What they add to the covariance (20, 20) over a short `duration`, s."""
         added = jnp.zeros((NUM_ERRORS, NUM_ERRORS))
         eye = jnp.eye(3)
         for power, place, rate in (
-            (rotational * self.angular_acceleration**2, ATTITUDE, RATE),
-            (translational * self.linear_acceleration**2, POSITION, VELOCITY),
+            (self.angular_acceleration**2, ATTITUDE, RATE),
+            (self.linear_acceleration**2, POSITION, VELOCITY),
         ):
             added = added.at[place, place].set(power * duration**3 / 3 * eye)
             added = added.at[place, rate].set(power * duration**2 / 2 * eye)
             added = added.at[rate, place].set(power * duration**2 / 2 * eye)
             added = added.at[rate, rate].set(power * duration * eye)
-        added = added.at[INERTIA, INERTIA].set(rotational * self.inertia**2 * duration * jnp.eye(5))
-        return added.at[OFFSET, OFFSET].set(translational * self.offset**2 * duration * eye)
+        added = added.at[INERTIA, INERTIA].set(self.inertia**2 * duration * jnp.eye(5))
+        return added.at[OFFSET, OFFSET].set(self.offset**2 * duration * eye)
 
 
 def advance(estimate: TargetEstimate, duration: Scalar, order: int) -> tuple[TargetEstimate, Matrix]:

@@ -11,9 +11,9 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.robots.lumping import on_host, to_array
 from jffsr.spatial.rotation import quaternion_to_matrix
-from jffsr.target.estimate import NUM_ERRORS, TargetEstimate
+from jffsr.target.estimate import NUM_ERRORS, TargetEstimate, corrected
 from jffsr.target.inertia_parameters import NUM_PARAMETERS, checked_parameters
-from jffsr.types import Array
+from jffsr.types import Array, Matrix
 
 
 @jax.tree_util.register_dataclass
@@ -99,6 +99,12 @@ class TargetPrior:
                 (self.velocity - estimate.velocity) / self.velocity_deviation,
                 (self.marker_offset_T - estimate.marker_offset_T) / self.offset_deviation,
             ]
+        )
+
+    def derivative(self, estimate: TargetEstimate) -> Matrix:
+        """Derivative (14, 20) of less the normalised residual by the estimate's errors."""
+        return -jax.jacfwd(lambda error: self.normalised_residual(corrected(estimate, error)))(
+            jnp.zeros(NUM_ERRORS)
         )
 
 

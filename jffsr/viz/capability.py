@@ -145,7 +145,8 @@ def draw_capability_space(
     axes.set_position((0.03, -0.03, 0.81, 1.04))
     figure.suptitle(
         f"{capability.robot}: the far half of the map, cells of {1e2 * float(capability.spacing):.3g} cm",
-        y=0.97,
+        y=0.96,
+        fontsize=8,
     )
     bar = figure.add_axes((0.86, 0.22, 0.025, 0.52))
     figure.colorbar(dots, cax=bar, label=_LABEL, ticks=np.linspace(0, 1, 6))

@@ -60,7 +60,7 @@ def test_written_out_and_read_again_is_the_same():
     assert again == config
 
 
-KEYS = "the keys here are final_attitude, joint_limits, base_excursion, torque_limit"
+KEYS = "the keys here are final_attitude, joint_limits, base_excursion, torque_limit, clearance"
 ONE = "one of 'goal' (w, x, y, z), 'angle_deg' and 'angle' is expected"
 MISTAKES = {
     "constraints: {final_atitude: {angle: 0}}\n": "x.yaml:7: constraints.final_atitude: unknown key; "

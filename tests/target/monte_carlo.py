@@ -21,9 +21,9 @@ GRASP = (jnp.array([0.2, -0.1, 0.05]), jnp.array([0.5, 0.5, 0.5, 0.5]))
 
 
 @partial(jax.jit, static_argnums=(0, 1, 3, 4, 5, 6, 8))
-def simulate(camera, settings, prior, count, runs, horizon, every, seed, factor=1.0):
-    """NEES, NIS, whether used, the last errors and deviations, and the predictions' errors and claims of many runs;
-    the tolerances of convergence are the standard ones times the factor."""
+def simulate(camera, settings, prior, count, runs, horizon, every, first_seed, factor=1.0):
+    """NEES, NIS, whether used, the last errors and deviations, and the predictions' errors and claims of many
+    runs, with the seeds from the first one on; the tolerances of convergence are the standard ones times the factor."""
     usual = ConvergenceTolerances()
     tolerances = ConvergenceTolerances(*(factor * usual.sizes))
 
@@ -68,4 +68,4 @@ def simulate(camera, settings, prior, count, runs, horizon, every, seed, factor=
             "predicted_nees": predicted_nees,
         }
 
-    return jax.lax.map(one, jax.random.split(jax.random.key(seed), runs), batch_size=min(runs, 25))
+    return jax.lax.map(one, jax.vmap(jax.random.key)(first_seed + jnp.arange(runs)), batch_size=min(runs, 25))
