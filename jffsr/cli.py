@@ -36,6 +36,7 @@ examples:
   jffsr run wu_2018
   jffsr check runs/composite_wu6
   jffsr robots wu_6dof
+  jffsr map servicer_7dof
 
 exit status: 0 done and accuracy met; 3 done, accuracy not met; 2 bad input; 130 interrupted, checkpoint
 written (the same command with the same --out goes on from there); 1 a defect."""
@@ -128,6 +129,8 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("run", metavar="RUN_DIR", help="the folder of a finished run or sweep")
     show.set_defaults(command=_show)
 
+    _add_map(commands)
+
     robots = commands.add_parser(
         "robots",
         help="the catalogue of robots, with sources",
@@ -181,6 +184,37 @@ def _add_sweep(commands: argparse._SubParsersAction) -> None:
         help="of a dask cluster that does the work, for example tcp://10.0.0.1:8786",
     )
     sweep.set_defaults(command=_sweep, coordinator=None, processes=None, process=None)
+
+
+def _add_map(commands: argparse._SubParsersAction) -> None:
+    capability = commands.add_parser(
+        "map",
+        help="search which poses an arm reaches, cell by cell",
+        description="Search a robot's capability map: the share of poses that its tool reaches in each cell of the "
+        "workspace, within joint limits and clear of its own bodies. Interrupted, the same command goes on.",
+    )
+    capability.add_argument("robot", metavar="ROBOT", help="a catalogue name or a robot file")
+    capability.add_argument(
+        "settings",
+        metavar="KEY=VALUE",
+        nargs="*",
+        help="cells=20000, directions=50, rolls=8, end_effector, self_clearance=true, margin=0.0 (m), seed=0",
+    )
+    capability.add_argument("--out", metavar="FILE.nc", help="the map's file (default: ROBOT_map.nc)")
+    capability.set_defaults(command=_map, coordinator=None, processes=None, process=None)
+
+
+def _map(arguments: argparse.Namespace) -> int:
+    _prepare_jax()
+    _use_all_devices(arguments)
+    from jffsr.study.capability import build_map, map_text
+
+    robot, capability, path = build_map(arguments.robot, arguments.out, arguments.settings)
+    from jffsr.viz.capability import save_map_figures
+
+    files = save_map_figures(capability, robot, path.with_suffix(""))
+    print(map_text(capability, path) + "\n  figures " + "\n          ".join(map(str, files)))
+    return MET
 
 
 def _sweep(arguments: argparse.Namespace) -> int:

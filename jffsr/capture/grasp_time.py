@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import jax
@@ -17,6 +17,7 @@ from jffsr.capture.inverse_kinematics_floating import floating_inverse_kinematic
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.errors import InputError
+from jffsr.planning.reachability import least_durations
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.target.grasp_frames import grasp_frame
@@ -24,7 +25,10 @@ from jffsr.target.tumbling import TargetMotion
 from jffsr.types import Twist
 
 SAMPLES = 2001
-STARTS = 15
+STARTS = 31
+LARGEST_BOW = 1.0
+"""rad or m: how far the way to a grasp may be bent when it is confirmed."""
+_ITERATIONS = 20
 _MOST_TRIED = 8
 
 
@@ -86,9 +90,10 @@ def grasp_time(
     the grasp frame's first axis, D the capability map's value at that point in the base frame of the start, above
     `least_share`; without a map D is 0 and every point counts as near. grasps, names, all the target's by default;
     window, s, the whole motion by default, at `samples` equal steps, minima polished between them. With `confirm` the
-    candidates are tried in order, best first and eight at most, by inverse kinematics with a floating base from `state`
-    along a straight quintic joint path under `momentum` that begins with the window. Raises InputError for a window
-    outside the motion, and for a map of another robot or end effector.
+    candidates are tried in order, best first and eight at most, by `floating_inverse_kinematics` from `state` under
+    `momentum`, in a motion that begins with the window: the way may be bent by up to a radian, and the time must be
+    enough for the joints' rate and acceleration limits. Raises InputError for a window outside the motion, and for a
+    map of another robot or end effector.
     """
     names = tuple(motion.target.grasp_names if grasps is None else grasps)
     start, end = _window(motion, window)
@@ -111,9 +116,9 @@ def grasp_time(
             return GraspTime(GraspTimeCode.FOUND, sentence, candidate, candidates, scans, solution)
     tried = min(len(candidates), _MOST_TRIED)
     sentence = (
-        f"not confirmed: with the base {base_mode.replace('_', ' ')} the tool reaches the grasp frame at none of the "
-        f"{tried} best times, the best of them {candidates[0].time:.4g} s; ask for a larger share of the map "
-        f"(least_share), another grasp frame, or a longer window"
+        f"not confirmed: with the base {base_mode.replace('_', ' ')} the tool reaches the grasp frame, in the time "
+        f"there is, at none of the {tried} best times, the best of them {candidates[0].time:.4g} s; ask for a larger "
+        f"share of the map (least_share), another grasp frame, or a longer window"
     )
     return GraspTime(GraspTimeCode.NOT_CONFIRMED, sentence, None, candidates, scans)
 
@@ -144,6 +149,8 @@ def _confirmed(robot, motion, state, candidate, begin, momentum, base_mode, end_
     position, quaternion, _ = grasp_frame(motion.target, motion(candidate.time), candidate.grasp)
     drawn = random_starts(robot, jax.random.key(seed), STARTS)
     starts = jnp.concatenate([jnp.asarray(state.joint_position)[None], drawn])
+    # At the very beginning there is no time to move in.
+    duration = max(candidate.time - begin, 1e-3)
     found = floating_inverse_kinematics(
         robot,
         position,
@@ -151,12 +158,15 @@ def _confirmed(robot, motion, state, candidate, begin, momentum, base_mode, end_
         state,
         starts,
         momentum=momentum,
-        # At the very beginning there is no time to move in; without momentum it is of no account.
-        duration=max(candidate.time - begin, 1e-3),
+        duration=duration,
+        largest_bow=LARGEST_BOW,
         base_mode=base_mode,
         end_effector=end_effector,
+        iterations=_ITERATIONS,
     )
-    return found.best(state.joint_position)
+    here, goals = np.asarray(state.joint_position), np.asarray(found.joint_position)
+    soon = [np.all(least_durations(robot, here, goal) <= duration) for goal in goals]
+    return replace(found, success=found.success & np.array(soon)).best(here)
 
 
 def _found(candidate: GraspCandidate) -> str:

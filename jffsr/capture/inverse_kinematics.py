@@ -29,7 +29,8 @@ class JointSolutions:
 
     joint_position (..., k, n), rad or m, always within the limits; position_error (..., k), m; attitude_error
     (..., k), rad, the angle that is left; success (..., k), whether both are within their tolerances. base_position
-    (..., k, 3), m, and base_quaternion (..., k, 4), B to I, where the base floats: its pose when the tool is there.
+    (..., k, 3), m, and base_quaternion (..., k, 4), B to I, where the base floats: its pose when the tool is there; bow
+    (..., k, n), rad or m, where the way there was bent.
     """
 
     joint_position: Array
@@ -38,6 +39,7 @@ class JointSolutions:
     success: Array
     base_position: Array | None = None
     base_quaternion: Array | None = None
+    bow: Array | None = None
 
     def best(self, near: Array | None = None) -> JointSolutions:
         """The same without the axis of starts: the success nearest to `near` (..., n), rad or m, in joint space.

@@ -121,7 +121,7 @@ def _draw(robot: Robot, scene: Scene, sample: int) -> Figure:
         axes = figure.add_subplot(projection="3d", computed_zorder=False)
         azimuth = viewpoint(scene.segments[sample], scene.base_position[sample])
         towards = frame_space(axes, low, high, azimuth, labelpad=-4)
-    _draw_solids(axes, solids, towards, 0.02 * reach, size)
+    draw_solids(axes, solids, towards, 0.02 * reach, size)
     for ends in np.swapaxes(axes_ends, 0, 1):
         axes.plot(*ends.T[:size], **_JOINT, zorder=5, solid_capstyle="round")
     axes.plot(*joints.T[:size], **_JOINT, linestyle="none", marker="o", markersize=2.6, zorder=6)
@@ -177,8 +177,8 @@ def _colour(body: int) -> tuple:
     return _BASE if body == 0 else _LINKS[body % 2]
 
 
-def _draw_solids(axes, solids: list, towards: np.ndarray, longest: float, size: int) -> None:
-    """All faces, small, from the farthest to the nearest."""
+def draw_solids(axes, solids: list, towards: np.ndarray, longest: float, size: int) -> None:
+    """All faces of `solids_of`, small, from the farthest to the nearest, in axes that show two dimensions or three."""
     if size == 3:
         right, up = across_view(towards)
         light = towards + 0.8 * up - 0.5 * right
