@@ -152,7 +152,7 @@ def written(case: Case, summary: dict) -> str:
 
 
 def table(measured: dict[Case, dict]) -> str:
-    """The page's table, and the figure under it."""
+    """The page's table."""
     rows = [
         "| noise | prior: inertia, offset | innovation inside | estimation error inside, below, above |"
         " its mean at 10, 20, 30, 50 s | convergence declared, right, after | lost |",

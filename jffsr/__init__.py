@@ -121,7 +121,6 @@ _HOME = {
     "has_converged": "jffsr.target.prediction",
     "convergence": "jffsr.target.prediction",
     "Contact": "jffsr.capture.contact",
-    "DIRECTIONS": "jffsr.capture.contact",
     "grasp_impact": "jffsr.capture.contact",
     "point_impact": "jffsr.capture.contact",
     "Compound": "jffsr.capture.contact_compound",
