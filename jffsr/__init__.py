@@ -136,7 +136,6 @@ _HOME = {
     "grasp_time": "jffsr.capture.grasp_time",
     "floating_inverse_kinematics": "jffsr.capture.inverse_kinematics_floating",
     "Contact": "jffsr.capture.contact",
-    "DIRECTIONS": "jffsr.capture.contact",
     "grasp_impact": "jffsr.capture.contact",
     "point_impact": "jffsr.capture.contact",
     "Compound": "jffsr.capture.contact_compound",
