@@ -70,6 +70,7 @@ _HOME = {
     "map_batch": "jffsr.parallel.mapping",
     "use_all_cores": "jffsr.parallel.cores",
     "crosscheck_many": "jffsr.crosscheck.mjx_batch",
+    "check_contacts": "jffsr.crosscheck.contacts",
     "CompositeIndex": "jffsr.objectives.composite",
     "minimize": "jffsr.optimizers.minimize",
     "pareto": "jffsr.optimizers.pareto",

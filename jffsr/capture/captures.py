@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.capture.approach import HALF_ANGLE
 from jffsr.capture.batch import Restored, restore_many
 from jffsr.capture.candidates import (
     LOOKS_AWAY,
@@ -57,7 +58,7 @@ class CaptureSettings:
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     free_time: bool = True
     margin: float = 0.02
-    half_angle: float | None = float(np.deg2rad(30.0))
+    half_angle: float | None = HALF_ANGLE
     deceleration: float = 0.01
     tolerance: float = 1e-6
     num_steps: int = NUM_STEPS
