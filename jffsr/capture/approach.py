@@ -21,7 +21,6 @@ from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.spatial.safe import safe_norm
 from jffsr.types import Array, Scalar, Vector, Vector3
 
-
 HALF_ANGLE = float(np.deg2rad(30.0))
 
 
