@@ -120,8 +120,13 @@ def planned_again(path: Path, seed: int, numbers: list[int], base_mode: str) -> 
     return lines
 
 
+def is_captured(line: dict) -> bool:
+    """Whether a line tells of a capture that the re-run says is one."""
+    return line["code"] == CaptureCode.CAPTURED
+
+
 def _share(lines: list[dict]) -> float:
-    return float(np.mean([line["code"] == CaptureCode.CAPTURED for line in lines]))
+    return float(np.mean([is_captured(line) for line in lines]))
 
 
 def _solved(samples: list[Sample], settings: CaptureSettings, base_mode: str) -> list[dict]:

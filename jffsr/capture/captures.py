@@ -161,7 +161,7 @@ def plan_captures(
         )
         sought.take(found, chosen, task_of)
     plans = tuple(problems[k] for k in sought.problem)
-    motion, verification, verdict = _reviewed(plans, sought.free, settings.step_factor)
+    motion, verification, verdict = reviewed(plans, sought.free, settings.step_factor)
     code = np.where(verdict == ResultCode.ACCURACY_MET, CaptureCode.CAPTURED, CaptureCode.NOT_VERIFIED)
     code = np.where(sought.kept, code, CaptureCode.NOT_FOUND)
     code = np.where(np.any(facing, axis=1), code, CaptureCode.NEVER_FACING)
@@ -262,7 +262,7 @@ class _Sought:
                 )
 
 
-def _reviewed(problems: Sequence[Problem], free: np.ndarray, step_factor: int):
+def reviewed(problems: Sequence[Problem], free: np.ndarray, step_factor: int):
     """Motions, verifications and codes (K,) of plans, by the independent re-run, some at a time."""
     parts, count = [], len(problems)
     size = min(VERIFIED_AT_ONCE, count)

@@ -19,7 +19,7 @@ class CaptureCode(IntEnum):
     NEVER_FACING = 1
     START_IN_COLLISION = 2
     GRASP_INSIDE_BODY = 3
-    NOT_CONVERGED_ESTIMATE = 4
+    ESTIMATE_NOT_CONVERGED = 4
     NOT_FOUND = 5
     NOT_VERIFIED = 6
 
@@ -55,7 +55,7 @@ def explain_capture(
         text = "the robot starts in collision with itself or the target; give another start"
     elif code is CaptureCode.GRASP_INSIDE_BODY:
         text = "the grasp frame lies inside the target's own body, where no tool can go; move it out"
-    elif code is CaptureCode.NOT_CONVERGED_ESTIMATE:
+    elif code is CaptureCode.ESTIMATE_NOT_CONVERGED:
         text = "the target's estimate has not converged, so that it cannot be predicted; observe for longer"
     elif code is CaptureCode.NOT_FOUND:
         text = (

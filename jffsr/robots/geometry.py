@@ -38,6 +38,22 @@ class Shape:
     roles: tuple[str, ...] = (VISUAL, COLLISION)
     colour: tuple[float, float, float, float] | None = None
 
+    def contains(self, points: np.ndarray) -> np.ndarray:
+        """Which points (k, 3), m, in the frame of the body lie inside, boolean (k,); of a mesh none."""
+        size, x = self.size, (np.asarray(points) - self.position) @ self.rotation
+        if self.kind == BOX:
+            return np.all(np.abs(x) < size, axis=-1)
+        if self.kind == SPHERE:
+            return np.linalg.norm(x, axis=-1) < size[0]
+        if self.kind == ELLIPSOID:
+            return np.sum((x / size) ** 2, axis=-1) < 1
+        if self.kind == CYLINDER:
+            return (np.hypot(x[:, 0], x[:, 1]) < size[0]) & (np.abs(x[:, 2]) < size[1])
+        if self.kind == CAPSULE:
+            beyond = np.maximum(np.abs(x[:, 2]) - size[1], 0)
+            return np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2 + beyond**2) < size[0]
+        return np.zeros(len(x), dtype=bool)
+
 
 @dataclass(frozen=True, eq=False)
 class Geometry:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from jffsr.dynamics.base_mode import FIXED
-from jffsr.robots.geometry import BOX, CAPSULE, COLLISION, CYLINDER, ELLIPSOID, SPHERE, Shape
+from jffsr.robots.geometry import COLLISION
 from jffsr.robots.robot import REVOLUTE, Robot
 
 
@@ -70,21 +70,5 @@ def inside_base(
     local = np.einsum("kji,kj->ki", np.asarray(base_rotation), np.asarray(points) - np.asarray(base_position))
     found = np.zeros(len(local), dtype=bool)
     for shape in robot.geometry.on_body(robot.body_names[0], COLLISION):
-        found |= _inside(shape, (local - shape.position) @ shape.rotation)
+        found |= shape.contains(local)
     return found
-
-
-def _inside(shape: Shape, x: np.ndarray) -> np.ndarray:
-    size = shape.size
-    if shape.kind == BOX:
-        return np.all(np.abs(x) < size, axis=-1)
-    if shape.kind == SPHERE:
-        return np.linalg.norm(x, axis=-1) < size[0]
-    if shape.kind == ELLIPSOID:
-        return np.sum((x / size) ** 2, axis=-1) < 1
-    if shape.kind == CYLINDER:
-        return (np.hypot(x[:, 0], x[:, 1]) < size[0]) & (np.abs(x[:, 2]) < size[1])
-    if shape.kind == CAPSULE:
-        beyond = np.maximum(np.abs(x[:, 2]) - size[1], 0)
-        return np.sqrt(x[:, 0] ** 2 + x[:, 1] ** 2 + beyond**2) < size[0]
-    return np.zeros(len(x), dtype=bool)

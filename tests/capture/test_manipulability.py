@@ -25,7 +25,9 @@ def jacobians():
     @jax.jit
     def all_three():
         kin = jffsr.kinematics(robot, STATE)
-        held = [grasped_jacobian(robot, STATE, np.array(p), TURN) for p in ((-0.4, 0.1, 0.2), (1.0, -2.0, 0.5))]
+        held = [
+            grasped_jacobian(robot, STATE, np.array(p), TURN) for p in ((-0.4, 0.1, 0.2), (1.0, -2.0, 0.5))
+        ]
         return jffsr.generalized_jacobian(robot, kin), *held
 
     return jax.device_get(all_three())
