@@ -7,7 +7,7 @@ products a pair instead of the derivative of all that led to the distance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from types import ModuleType
 
@@ -17,9 +17,10 @@ import numpy as np
 
 from jffsr.clearance.boxes import box_box_distance
 from jffsr.clearance.cores import box_segment_distance, segment_segment_distance
-from jffsr.clearance.layout import Layout, SolidNumbers
+from jffsr.clearance.layout import Kind, Layout, SolidNumbers
 from jffsr.clearance.numerics import computed_once
 from jffsr.clearance.placed import Placed, moved, place
+from jffsr.clearance.solids import BOX_CORE, SEGMENT_CORE
 from jffsr.spatial.components import Components, Rows, add, cross, dot, scale, subtract
 from jffsr.types import Array
 
@@ -88,16 +89,17 @@ def distances_and_forces(
 
 def _compared(xp: ModuleType, layout: Layout, solids: Placed) -> Iterator:
     """Each kind of pairs of solids: the function of their distance, their numbers (2, k), and both, placed."""
-    kinds = (
-        (layout.segment_pairs, segment_segment_distance),
-        (layout.box_segment_pairs, box_segment_distance),
-        (layout.box_pairs, box_box_distance),
-    )
-    for pairs, distance in kinds:
-        if pairs:
-            chosen = np.array(pairs).T
-            a, b = (jax.tree.map(lambda x, i=end: x[i], solids) for end in chosen)
-            yield distance, chosen, *computed_once(xp, (a, b))
+    for kind, pairs in layout.groups:
+        chosen = np.array(pairs).T
+        a, b = (jax.tree.map(lambda x, i=end: x[i], solids) for end in chosen)
+        yield _distance_of(kind), chosen, *computed_once(xp, (a, b))
+
+
+def _distance_of(kind: Kind) -> Callable[[ModuleType, Placed, Placed], Array]:
+    if kind.second == BOX_CORE:
+        return box_box_distance
+    between = segment_segment_distance if kind.first == SEGMENT_CORE else box_segment_distance
+    return partial(between, ends=kind.ends)
 
 
 def _of_nearest(xp: ModuleType, layout: Layout, distance: Array, also=()):
@@ -114,11 +116,10 @@ def _of_nearest(xp: ModuleType, layout: Layout, distance: Array, also=()):
 
 def _flipped(layout: Layout) -> np.ndarray:
     """Which pairs of solids (k,) are in the other order than the bodies that they are on."""
-    pairs = (*layout.segment_pairs, *layout.box_segment_pairs, *layout.box_pairs)
     owner = {
         k: pair for pair, members in zip(layout.body_pairs, layout.members, strict=True) for k in members
     }
-    return np.array([layout.bodies[a] != owner[k][0] for k, (a, _) in enumerate(pairs)])
+    return np.array([layout.bodies[a] != owner[k][0] for k, (a, _) in enumerate(layout.solid_pairs)])
 
 
 def _lever(layout: Layout, position: Components, solid: Placed, chosen: np.ndarray) -> Components:

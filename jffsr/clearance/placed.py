@@ -5,11 +5,13 @@ from __future__ import annotations
 from types import ModuleType
 from typing import NamedTuple
 
-from jffsr.clearance.numerics import computed_once, root
+from jffsr.clearance.numerics import held, root
 from jffsr.spatial.components import Components, Rows, add, cross, dot, rows_times
 from jffsr.types import Array
 
 _SMALL = 1e-12
+# Less than this is rounding: the cosine of a direction and an axis, and such a product times a radius, m.
+_SQUARE = 1e-9
 
 
 class Placed(NamedTuple):
@@ -52,12 +54,20 @@ def place(numbers, bodies, position: Components, rotation: Rows) -> Placed:
 
 def extent(xp: ModuleType, direction: Components, solid: Placed) -> Array:
     """Largest n . x, m, of a solid's points x about its centre, for unit directions n in I."""
-    # The best direction is often square to an axis. The sign of their product, which is rounding then, has to be the
-    # same wherever it is used, or derivatives that should cancel do not.
-    along = computed_once(xp, [dot(direction, column) for column in solid.columns])
-    straight = sum(half * xp.abs(n) for half, n in zip(solid.box, along, strict=True))
+    along = [dot(direction, column) for column in solid.columns]
+    straight = sum(half * _magnitude(xp, n) for half, n in zip(solid.box, along, strict=True))
     square = sum((axis * n) ** 2 for axis, n in zip(solid.ellipsoid, along, strict=True))
-    return straight + solid.ball + root(xp, square)
+    return straight + solid.ball + xp.where(square > _SQUARE**2, root(xp, square), held(xp, root(xp, square)))
+
+
+def _magnitude(xp: ModuleType, x: Array) -> Array:
+    """|x|, whose derivative is zero where x is zero but for rounding.
+
+    The best direction is often square to an axis, and stays so: the sign of their product is rounding then, and need
+    not be the same in all the places where a compiler computes it, so that what should cancel would not.
+    """
+    size = xp.abs(x)
+    return xp.where(size > _SQUARE, size, held(xp, size))
 
 
 def gap_along(xp: ModuleType, direction: Components, away: Components, a: Placed, b: Placed) -> Array:

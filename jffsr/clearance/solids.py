@@ -32,8 +32,9 @@ class Solid:
     """A shape on body `body` (its number), in the body's frame.
 
     centre (3,), m; axes (3, 3), the solid's own axes as columns; core, which of the two; half (3,), m, half sides of
-    the core, a segment's along the third axis; radius, m, of the ball around the core; slack, m, about how far the
-    enclosure reaches beyond the shape, zero for none; box (3,), ball () and ellipsoid (3,), m, of the extent.
+    the core, a segment's along the third axis; has_ends, whether flat ends square to that axis count by themselves;
+    radius, m, of the ball around the core; slack, m, about how far the enclosure reaches beyond the shape, zero for
+    none; box (3,), ball () and ellipsoid (3,), m, of the extent.
     """
 
     body: int
@@ -41,6 +42,7 @@ class Solid:
     axes: np.ndarray
     core: str
     half: np.ndarray
+    has_ends: bool
     radius: float
     slack: float
     box: np.ndarray
@@ -51,11 +53,12 @@ class Solid:
 def solid_of(shape: Shape, body: int, as_capsule: bool) -> Solid:
     """The solid of a shape; as_capsule: boxes, ellipsoids and meshes get a capsule around them unless they are plates.
 
-    A mesh becomes the box around its vertices along their principal axes.
+    Else the flat ends of cylinders count by themselves. A mesh becomes the box around its vertices along their
+    principal axes.
     """
     centre, axes = np.asarray(shape.position, float), np.asarray(shape.rotation, float)
     if shape.kind in (SPHERE, CAPSULE, CYLINDER):
-        return _round(shape, body, centre, axes)
+        return _round(shape, body, centre, axes, not as_capsule)
     if shape.kind == MESH:
         centre, axes, half = _box_around(np.asarray(shape.vertices, float) @ axes.T + centre)
     else:
@@ -67,21 +70,23 @@ def solid_of(shape: Shape, body: int, as_capsule: bool) -> Solid:
     if as_capsule and half[0] > _PLATE * half[1]:
         around = np.hypot(half[0], half[1]) if shape.kind != ELLIPSOID else half[1]
         core = np.array([0.0, 0.0, half[2]])
-        return Solid(body, centre, axes, SEGMENT_CORE, core, around, around, box, 0.0, ellipsoid)
+        return Solid(body, centre, axes, SEGMENT_CORE, core, False, around, around, box, 0.0, ellipsoid)
     slack = _CORNER * half[1] if shape.kind == ELLIPSOID else 0.0
-    return Solid(body, centre, axes, BOX_CORE, half, 0.0, slack, box, 0.0, ellipsoid)
+    return Solid(body, centre, axes, BOX_CORE, half, False, 0.0, slack, box, 0.0, ellipsoid)
 
 
-def _round(shape: Shape, body: int, centre: np.ndarray, axes: np.ndarray) -> Solid:
+def _round(shape: Shape, body: int, centre: np.ndarray, axes: np.ndarray, has_ends: bool) -> Solid:
     """Sphere, capsule or cylinder: a segment along z and a ball, or the box around a flat cylinder."""
     radius, length = float(shape.size[0]), float(shape.size[1]) if shape.kind != SPHERE else 0.0
     zero, along = np.zeros(3), np.array([0.0, 0.0, length])
     if shape.kind != CYLINDER:
-        return Solid(body, centre, axes, SEGMENT_CORE, along, radius, radius, along, radius, zero)
+        return Solid(body, centre, axes, SEGMENT_CORE, along, False, radius, radius, along, radius, zero)
     disc = np.array([radius, radius, 0.0])
     if length <= _PLATE * radius:
-        return Solid(body, centre, axes, BOX_CORE, disc + along, 0.0, _CORNER * radius, along, 0.0, disc)
-    return Solid(body, centre, axes, SEGMENT_CORE, along, radius, radius, along, 0.0, disc)
+        return Solid(
+            body, centre, axes, BOX_CORE, disc + along, False, 0.0, _CORNER * radius, along, 0.0, disc
+        )
+    return Solid(body, centre, axes, SEGMENT_CORE, along, has_ends, radius, radius, along, 0.0, disc)
 
 
 def _box_around(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

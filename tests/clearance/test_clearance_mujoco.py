@@ -6,6 +6,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from two_solids import largest_gap, mujoco_distances, random_poses, random_shape, two_solids
 
 EXACT = ("sphere", "capsule", "box")
@@ -66,3 +67,21 @@ def test_tubes_lose_little():
     lost = (theirs - ours)[apart]
     assert np.median(lost) < 1e-3
     assert lost.max() < 0.06
+
+
+def test_flat_ends_of_a_cylinder_count():
+    """In front of an end, off the axis, the distance is that to the end: of a sphere, and of a box's corner."""
+    generator = np.random.default_rng(7)
+    cylinder = random_shape("cylinder", generator, size=np.array([0.5, 0.6]))
+    side, height = generator.uniform(-0.3, 0.3, (50, 2)), generator.uniform(0.7, 2.0, 50)
+    rotation = Rotation.random(50, random_state=generator).as_matrix()
+    place = np.einsum("kij,kj->ki", rotation, np.column_stack([side, height]))
+    position = np.stack([np.zeros_like(place), place], axis=1)
+    sphere = random_shape("sphere", generator, size=np.array([0.1]))
+    ours = two_solids(cylinder, sphere)(position, np.stack([rotation, rotation], axis=1))[:, 0]
+    np.testing.assert_allclose(ours, height - 0.7, rtol=0, atol=1e-14)
+    box = random_shape("box", generator, size=np.full(3, 0.1))
+    turned = Rotation.random(50, random_state=generator).as_matrix()
+    ours = two_solids(cylinder, box)(position, np.stack([rotation, turned], axis=1))[:, 0]
+    reach = 0.1 * np.abs(np.einsum("kij,ki->kj", turned, rotation[:, :, 2])).sum(axis=1)
+    np.testing.assert_allclose(ours, height - 0.6 - reach, rtol=0, atol=1e-14)
