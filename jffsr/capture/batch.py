@@ -27,6 +27,9 @@ from jffsr.types import Array
 _STEPS = 6
 """Steps between two looks: enough that the look costs nothing, few enough that no lane idles for long."""
 
+_AT_ONCE = 2
+"""Lanes evaluated together on a core: the derivatives of more leave its cache."""
+
 
 @dataclass(frozen=True)
 class Restored:
@@ -64,7 +67,7 @@ def _go_on(problems: Problem, states: RestorationState, method: Restoration) -> 
 
         return jax.lax.scan(step, state, length=_STEPS)[0]
 
-    return spread(one, (problems, states), chunk=len(states.trials.active), together=True)
+    return spread(one, (problems, states), chunk=_AT_ONCE, together=True)
 
 
 def restore_many(
