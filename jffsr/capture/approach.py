@@ -21,6 +21,8 @@ from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.spatial.safe import safe_norm
 from jffsr.types import Array, Scalar, Vector, Vector3
 
+HALF_ANGLE = float(np.deg2rad(30.0))
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class ApproachCone:
     """
 
     path: GraspPath
-    half_angle: Array | float = np.deg2rad(30.0)
+    half_angle: Array | float = HALF_ANGLE
     speed: Array | float = 0.01
     tolerance: Array | float = 1e-3
     samples: int = field(default=5, metadata={"static": True})

@@ -80,8 +80,10 @@ def restore_many(
     """Free numbers that keep the constraints of each problem, from the starts (K, s, k) in their order.
 
     Problems of one structure. Where task_of names for each the task it is a variant of, the others of a task are left
-    alone once one is solved; the first start of each variant comes before all second starts. lanes run at once; a start is given up after most_steps. on_progress is told how many
-    tasks are solved and how many are open. Raises InputError for problems or starts that do not go together.
+    alone once one is solved; the first start of each variant comes before all second starts. lanes run at once; a
+    start is given up after most_steps. With more lanes than tasks several starts of a task run side by side, and the
+    first to succeed is taken. on_progress is told how many tasks are solved and how many are open. Raises
+    InputError for problems or starts that do not go together.
     """
     problems, starts = list(problems), np.asarray(starts, dtype=float)
     if not problems:
@@ -145,7 +147,7 @@ class _Work:
     """The attempts that are still to be made, first starts first, and what became of those that were."""
 
     def __init__(self, starts: np.ndarray, tasks: np.ndarray):
-        count, each, size = starts.shape
+        count, each, _ = starts.shape
         self._starts, self._tasks = starts, tasks
         variant = np.array([np.sum(tasks[:k] == task) for k, task in enumerate(tasks)])
         order = np.argsort(variant, kind="stable")

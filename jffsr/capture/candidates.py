@@ -12,7 +12,6 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.capture.grasp_path import GraspPath
-from jffsr.capture.inverse_kinematics import random_starts
 from jffsr.capture.inverse_kinematics_floating import floating_inverse_kinematics
 from jffsr.clearance.model import ClearanceModel
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
@@ -21,14 +20,15 @@ from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.types import Array, Scalar, Vector3
 
-_AWAY = 1e6
+LOOKS_AWAY = 1e6
 """Added to the criterion where the handle looks away from the tool: such times come last."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class GraspCandidates:
-    """time (c,), s, best first, and criterion (c,), m, infinite where there is no such time; postures at each, best
+    """time (c,), s, best first, and criterion (c,), m, LOOKS_AWAY or more where the frame looks
+    away, infinite where there is no such time; postures at each, best
     first: joint_position (c, s, n), base_position (c, s, 3), m, base_quaternion (c, s, 4), error (c, s), m and rad
     added, by which the straight joint path misses the grasp frame, and clearance (c, s), m, of all bodies there."""
 
@@ -61,13 +61,17 @@ def grasp_candidates(
     robot: Robot,
     path: GraspPath,
     initial_state: State,
+    starts: Array,
     clearance: ClearanceModel | None = None,
     settings: CandidateSettings | None = None,
     end_effector: str | None = None,
     momentum: Array | None = None,
     base_mode: str = "floating",
 ) -> GraspCandidates:
-    """The candidates of one target, for jit and vmap; settings are static. The robot starts at the path's `begin`."""
+    """The candidates of one target, for jit and vmap; settings are static.
+
+    The robot starts at the path's `begin`; inverse kinematics from its own joint positions and from `starts` (k, n).
+    """
     settings = settings or CandidateSettings()
     first, last = settings.window
     grid = jnp.arange(first, last + settings.step / 2, settings.step)
@@ -81,8 +85,7 @@ def grasp_candidates(
         values = jnp.where(jnp.abs(grid - grid[best]) < settings.apart, jnp.inf, values)
     time, criterion = jnp.stack(times), jnp.stack(criteria)
     position, quaternion, _ = jax.vmap(lambda t: path.frame(t, t))(time)
-    start = random_starts(robot, jax.random.key(settings.seed), settings.starts - 1)
-    start = jnp.concatenate([jnp.asarray(initial_state.joint_position)[None], start])
+    start = jnp.concatenate([jnp.asarray(initial_state.joint_position)[None], jnp.asarray(starts)])
     # With the base given way, how long the way takes counts only under momentum; one duration must do for all.
     found = floating_inverse_kinematics(
         robot,
@@ -101,7 +104,8 @@ def grasp_candidates(
     gap = jnp.full(error.shape, jnp.inf)
     if clearance is not None:
         of_time = jax.vmap(
-            lambda t, q, r, b: least_clearance(clearance, robot, path, t, State(r, b, q)), in_axes=(None, 0, 0, 0)
+            lambda t, q, r, b: least_clearance(clearance, robot, path, t, State(r, b, q)),
+            in_axes=(None, 0, 0, 0),
         )
         gap = jax.vmap(of_time)(time, found.joint_position, found.base_position, found.base_quaternion)
     return _ranked(found, initial_state, error, gap, time, criterion, settings.postures)
@@ -110,13 +114,13 @@ def grasp_candidates(
 def grasp_criterion(path: GraspPath, time: Scalar, tool: Vector3, value: Scalar | float = 0.0) -> Scalar:
     """(2 |rho| - n_x' rho)/(1 + D), m, of eq. (15), rho (3,) from the tool at its start to the grasp frame at `time`.
 
-    n_x is the grasp frame's first axis, value the capability map's D there; where n_x' rho <= 0 a large number is added.
+    n_x is the grasp frame's first axis, value the capability map's D there; where n_x' rho <= 0 LOOKS_AWAY is added.
     """
     position, quaternion, _ = path.frame(time, time)
     way = position - tool
     along = quaternion_to_matrix(quaternion)[:, 0] @ way
     criterion = (2 * jnp.sqrt(way @ way + 1e-24) - along) / (1 + value)
-    return jnp.where(along > 0, criterion, criterion + _AWAY)
+    return jnp.where(along > 0, criterion, criterion + LOOKS_AWAY)
 
 
 def least_clearance(
@@ -128,11 +132,15 @@ def least_clearance(
     return jnp.min(model(kin.origin, kin.rotation, target.position, quaternion_to_matrix(target.quaternion)))
 
 
-def _ranked(found, initial_state: State, error: Array, gap: Array, time, criterion, count: int) -> GraspCandidates:
+def _ranked(
+    found, initial_state: State, error: Array, gap: Array, time, criterion, count: int
+) -> GraspCandidates:
     """The best postures of each time: those that reach it and are clear, near to the start; then the others."""
     away = jnp.linalg.norm(found.joint_position - jnp.asarray(initial_state.joint_position), axis=-1)
     twice = _repeated(found.joint_position)
-    cost = away + 100 * jnp.maximum(error - 1e-3, 0) + 30 * jnp.maximum(0.02 - gap, 0) + jnp.where(twice, 1e3, 0)
+    cost = (
+        away + 100 * jnp.maximum(error - 1e-3, 0) + 30 * jnp.maximum(0.02 - gap, 0) + jnp.where(twice, 1e3, 0)
+    )
     order = jnp.argsort(cost, axis=-1)[:, :count]
 
     def chosen(leaf: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The tool meets the grasp frame: same pose, same twist, at the end of the motion; Wang et al. 2021, eqs. (24), (25)."""
+"""The tool meets the grasp frame: same pose and twist at the motion's end; Wang et al. 2021, eqs. (24), (25)."""
 
 from __future__ import annotations
 

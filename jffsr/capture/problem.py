@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jffsr.capture.approach import ApproachCone
+from jffsr.capture.approach import HALF_ANGLE, ApproachCone
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.match import GraspMatch
 from jffsr.capture.terms import BaseDisturbance
@@ -32,7 +32,7 @@ def capture_problem(
     duration_bounds: tuple[float, float] | None = None,
     terms: Sequence[Term] | None = None,
     clearance: Constraint | None = None,
-    half_angle: float | None = np.deg2rad(30.0),
+    half_angle: float | None = HALF_ANGLE,
     control_points: int = 8,
     degree: int = 4,
     num_steps: int = NUM_STEPS,

@@ -36,7 +36,7 @@ def capture_starts(
     base_position: Array,
     base_quaternion: Array,
     deceleration: Array,
-    end_effector: str | None = None,
+    end_effector: str | None,
 ) -> Array:
     """Free numbers (K, s, k) of captures that end near these postures.
 

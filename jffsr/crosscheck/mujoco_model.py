@@ -46,15 +46,15 @@ def to_mjspec(robot: Robot) -> mujoco.MjSpec:
         spec.option.disableflags |= int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}"))
 
     topology = robot.topology
-    base = spec.worldbody.add_body(name=_body_name(topology.body_names[0]))
+    base = spec.worldbody.add_body(name=body_name(topology.body_names[0]))
     base.add_freejoint()
     _set_inertia(base, robot, 0)
     bodies = [base]
     for i, parent in enumerate(topology.parents):
         body = bodies[parent].add_body(
-            name=_body_name(topology.body_names[i + 1]),
+            name=body_name(topology.body_names[i + 1]),
             pos=np.asarray(robot.joint_position[i], dtype=float),
-            quat=_quaternion(robot.joint_rotation[i]),
+            quat=rotation_quaternion(robot.joint_rotation[i]),
         )
         hinge, slide = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
         body.add_joint(
@@ -72,7 +72,7 @@ def to_mjspec(robot: Robot) -> mujoco.MjSpec:
         bodies[topology.end_effector_bodies[k]].add_site(
             name=name,
             pos=np.asarray(robot.end_effector_position[k], dtype=float),
-            quat=_quaternion(robot.end_effector_rotation[k]),
+            quat=rotation_quaternion(robot.end_effector_rotation[k]),
         )
     return spec
 
@@ -102,12 +102,14 @@ def to_mjmodel(robot: Robot, step: float) -> mujoco.MjModel:
         raise InputError(f"MuJoCo does not accept the robot '{robot.name}': {reason}") from error
 
 
-def _body_name(name: str) -> str:
+def body_name(name: str) -> str:
+    """The name that a body of ours has in MuJoCo."""
     # MuJoCo keeps this name for the inertial frame.
     return "world_body" if name == "world" else name
 
 
-def _quaternion(rotation) -> np.ndarray:
+def rotation_quaternion(rotation) -> np.ndarray:
+    """Unit quaternion (4,), (w, x, y, z), of a rotation matrix (3, 3), by MuJoCo."""
     import mujoco
 
     quaternion = np.zeros(4)
@@ -120,5 +122,5 @@ def _set_inertia(body, robot: Robot, index: int) -> None:
     body.explicitinertial = True
     body.mass = float(robot.mass[index])
     body.ipos = np.zeros(3) if index == 0 else np.asarray(robot.link_com[index - 1], dtype=float)
-    body.iquat = _quaternion(axes)
+    body.iquat = rotation_quaternion(axes)
     body.inertia = moments

@@ -84,7 +84,7 @@ class Restoration:
         else:
             values = finite_or_inf(population.values)
             order = jnp.argsort(values)[: self.starts]
-            points, values = population.positions[order], values[order]
+            points, values = jnp.asarray(population.positions)[order], values[order]
         count = points.shape[0]
         shape = jax.eval_shape(problem.evaluation, points[0], jnp.ones(()))
         size = shape.equality.shape[0] + shape.inequality.shape[0]

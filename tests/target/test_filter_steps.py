@@ -147,5 +147,7 @@ def test_chi_square_numbers_and_refused_settings():
         FilterSettings(gate_probability=1.0)
     with pytest.raises(InputError, match="acquisition is 0"):
         FilterSettings(acquisition=0)
+    with pytest.raises(InputError, match="refit_every is 0"):
+        FilterSettings(refit_every=0)
     with pytest.raises(InputError, match="angular_acceleration is -1"):
         ProcessNoise(angular_acceleration=-1.0)

@@ -8,16 +8,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from monte_carlo import simulate
-from scipy.stats import chi2
 
+from experiments.filter_consistency import simulate, summarise
 from jffsr.errors import InputError
 from jffsr.target.body import Target
 from jffsr.target.camera import Camera, observe_target, sample_times
 from jffsr.target.filter import (
     FilterSettings,
-    chi_square_bounds,
-    expected_innovation_squared,
     filter_target,
 )
 from jffsr.target.prior import TargetPrior
@@ -26,22 +23,6 @@ from jffsr.target.tumbling import target_motion
 
 COUNT, WINDOW = 60, 20
 SETTINGS = FilterSettings(acquisition=WINDOW, lost_after=6)
-TOLERANCES = np.array([0.01, np.deg2rad(2.0), 0.01, 0.01])
-
-
-def shares_inside(found, settings, runs):
-    """Shares of the sample times at which the means over the runs of NEES and NIS keep their 95 % bounds."""
-    low, high = chi_square_bounds(20, runs)
-    mean = found["nees"].mean(axis=0)
-    used = found["used"].sum(axis=0)
-    nis = (
-        np.where(found["used"], found["nis"], 0).sum(axis=0)
-        / used
-        / expected_innovation_squared(settings)
-        * 6
-    )
-    inside = (nis > chi2.ppf(0.025, 6 * used) / used) & (nis < chi2.ppf(0.975, 6 * used) / used)
-    return np.mean((mean > low) & (mean < high)), np.mean(inside), mean
 
 
 @pytest.mark.slow
@@ -52,10 +33,10 @@ def test_a_few_random_targets_are_estimated_consistently():
     found = {name: np.asarray(value) for name, value in found.items()}
     assert np.all(np.isfinite(found["nees"]))
     assert not np.any(found["lost"])
-    nees, nis, _ = shares_inside(found, settings, runs)
+    summary = summarise(found, settings, 1.0, 59)
     # Of 60 times 57 are expected inside; those of the estimation error hang together.
-    assert nis > 0.86
-    assert nees > 0.7
+    assert summary["nis_inside"] > 0.86
+    assert summary["nees_inside"] > 0.7
     # 95 % are seen, 2 % of them outliers; the gate refuses 0.1 % of the others.
     assert 0.89 < found["used"].mean() < 0.96
 
@@ -123,26 +104,21 @@ def test_too_few_poses_are_refused(followed):
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 3.0])
 def test_two_hundred_random_targets_are_estimated_consistently(factor):
+    """Seeds 0 to 199; at 95 % bounds a right filter too is outside at some times, which hang together."""
     runs, horizon, every = 200, 5.0, 10
     camera, settings = Camera().scaled(factor), FilterSettings()
-    found = simulate(camera, settings, TargetPrior.create(), 500, runs, horizon, every, 2, factor)
+    found = simulate(camera, settings, TargetPrior.create(), 500, runs, horizon, every, 0, factor)
     found = {name: np.asarray(value) for name, value in found.items()}
     assert np.all(np.isfinite(found["nees"]))
-    assert not np.any(found["lost"])
-    _, nis, mean = shares_inside(found, settings, runs)
-    assert nis > 0.93
-    # The joint square of all twenty errors keeps below its upper bound, 20.9, but for chance, and in the end is under
-    # the lower one, 19.1: the covariance is then a little too large.
-    assert np.all((mean > 17) & (mean < 21.5))
-    assert np.mean(mean < 20.9) > 0.85
+    summary = summarise(found, settings, factor, every)
+    assert summary["lost"] == 0
+    assert summary["nis_inside"] > 0.93
+    assert summary["nees_inside"] > 0.9
+    assert np.all((summary["nees"] > 19) & (summary["nees"] < 21.5))
     # Each error alone is as large as its deviation says.
     ratio = np.sqrt(np.mean((found["error"] / found["deviation"]) ** 2, axis=0))
     blocks = np.sqrt([np.mean(ratio[:, k] ** 2, axis=1) for k in np.split(np.arange(20), [3, 6, 11, 14, 17])])
-    assert np.all((blocks > 0.85) & (blocks < 1.2))
+    assert np.all((blocks > 0.85) & (blocks < 1.15))
     # Declared from the covariance alone, and right at that moment: every error of the prediction within its tolerance.
-    declared = found["declared"]
-    first, ever = declared.argmax(axis=1), declared.any(axis=1)
-    blocks = found["miss"][np.arange(runs), first].reshape(runs, 4, 3)
-    right = np.all(np.linalg.norm(blocks, axis=-1) <= factor * TOLERANCES, axis=1)
-    assert ever.mean() > 0.6
-    assert right[ever].mean() >= 0.95
+    assert summary["declared"] > 0.7
+    assert summary["right"] >= 0.95
