@@ -139,10 +139,11 @@ def draw_capability_space(
         marker="s",
         linewidths=0,
         zorder=1,
+        depthshade=False,
     )
     draw_solids(axes, solids, towards, 0.02 * np.ptp(corners, axis=0).max(), 3)
     figure.set_layout_engine("none")
-    axes.set_position((0.03, -0.03, 0.81, 1.04))
+    axes.set_position((0.06, -0.02, 0.72, 1.0))
     figure.suptitle(
         f"{capability.robot}: the far half of the map, cells of {1e2 * float(capability.spacing):.3g} cm",
         y=0.96,
