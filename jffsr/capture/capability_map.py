@@ -102,7 +102,7 @@ def capability_map(
     check_precision("float64")
     if not margin >= 0:
         raise InputError(f"capability map: margin is {margin} m; zero or more is expected")
-    grid, chain = pose_grid(robot, end_effector, cells, directions, rolls)
+    grid, _ = pose_grid(robot, end_effector, cells, directions, rolls)
     if self_clearance and clearance is None:
         clearance = ClearanceModel.create(robot)
     mark = fingerprint(robot, grid, self_clearance, clearance, margin, seed)
@@ -114,7 +114,7 @@ def capability_map(
     reached = (
         np.zeros((0, len(quaternion)), dtype=bool) if path is None else load_part(path, mark, len(quaternion))
     )
-    searcher = Searcher.create(robot, chain, clearance if self_clearance else None, margin, seed)
+    searcher = Searcher.create(robot, end_effector, clearance if self_clearance else None, margin, seed)
     while len(reached) < count:
         first = len(reached)
         found = search_block(searcher, grid, quaternion, grid.cells[first : first + each], (seed, first))

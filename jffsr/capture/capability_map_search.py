@@ -8,7 +8,9 @@ A posture with bodies in contact is no solution, and another is looked for.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,12 +18,14 @@ import numpy as np
 
 from jffsr.capture.capability_map_grid import PoseGrid, within_last_joint
 from jffsr.capture.inverse_kinematics import descend, random_starts
-from jffsr.capture.inverse_kinematics_chain import Chain, tool_pose
+from jffsr.capture.inverse_kinematics_chain import chain_to_tool, tool_pose
 from jffsr.clearance.along_motion import clearances
 from jffsr.clearance.model import ClearanceModel
-from jffsr.compiling import jit
-from jffsr.parallel.mapping import map_batch
+from jffsr.compiling import program
+from jffsr.parallel.devices import all_devices
+from jffsr.parallel.mapping import spread
 from jffsr.robots.robot import Robot
+from jffsr.types import Array
 
 LIBRARY = 16_384
 CANDIDATES = 32
@@ -35,76 +39,116 @@ BATCHES = (16_384, 2_048)
 CHUNK, CLEARANCE_CHUNK = 512, 64
 
 
+class Library(NamedTuple):
+    """Random postures: joint_position (l, n), rad or m; the tool there, position (l, 3), m, and quaternion (l, 4)."""
+
+    joint_position: Array
+    position: Array
+    quaternion: Array
+
+
+@dataclass(frozen=True)
 class Searcher:
-    """The search of one arm, whose library (l, n) of postures has its tool at poses (l, 3), (l, 4)."""
+    """The search of one arm, from postures of a library; `clearance`, m, has to exceed `margin` where it is given."""
 
-    def __init__(self, robot: Robot, chain: Chain, clear: Callable | None, library: np.ndarray, poses):
-        self.robot, self.chain, self.clear, self.library_size = robot, chain, clear, len(library)
-        joints, (position, quaternion), length = jnp.asarray(library), poses, float(chain.length)
-
-        def improve(item):
-            wanted, attitude, given, place = item
-            # The library is random, so that a slice of it is as good as a draw.
-            near_p = jax.lax.dynamic_slice_in_dim(position, place, CANDIDATES)
-            near_q = jax.lax.dynamic_slice_in_dim(quaternion, place, CANDIDATES)
-            away = jnp.sum((near_p - wanted) ** 2, axis=1) / length**2
-            turned = 4 * (1 - (near_q @ attitude) ** 2)
-            best = joints[place + jnp.argmin(away + turned)]
-            start = jnp.where(place >= 0, best, given)
-            found, errors = descend(chain, tuple(wanted), tuple(attitude), start, ITERATIONS)
-            return found, (errors[0] <= TOLERANCE) & (errors[1] <= TOLERANCE)
-
-        self._improve = improve
+    robot: Robot
+    end_effector: str | None
+    clearance: ClearanceModel | None
+    margin: float
+    library: Library
 
     @classmethod
     def create(
-        cls, robot: Robot, chain: Chain, clearance: ClearanceModel | None, margin: float, seed: int
+        cls,
+        robot: Robot,
+        end_effector: str | None,
+        clearance: ClearanceModel | None,
+        margin: float,
+        seed: int,
     ) -> Searcher:
-        """With a library drawn from the seed; a clearance model's distances, m, must all exceed the margin."""
-        clear = None
-        if clearance is not None:
-            still = jnp.zeros((1, 3)), jnp.array([[1.0, 0.0, 0.0, 0.0]])
-
-            def clear(q):
-                posture = SimpleNamespace(
-                    base_position=still[0], base_quaternion=still[1], joint_position=q[None]
-                )
-                return jnp.all(clearances(clearance, robot, posture) > margin)
-
+        """With a library drawn from the seed."""
         # Twice as many as are kept: most postures of most arms are clear of contact.
-        drawn = random_starts(robot, jax.random.key(seed), LIBRARY if clear is None else 2 * LIBRARY)
-        drawn = np.asarray(drawn)
-        if clear is not None:
-            drawn = drawn[np.asarray(map_batch(clear, jnp.asarray(drawn), chunk=CLEARANCE_CHUNK))][:LIBRARY]
-
-        def tool(q):
-            pose = tool_pose(chain, q[chain.index])
-            return jnp.stack(pose.position), jnp.stack(pose.quaternion)
-
-        return cls(robot, chain, clear, drawn, jit(jax.vmap(tool))(jnp.asarray(drawn)))
+        count = LIBRARY if clearance is None else 2 * LIBRARY
+        drawn = np.asarray(random_starts(robot, jax.random.key(seed), count))
+        if clearance is not None:
+            drawn = drawn[clear_postures(robot, clearance, margin, drawn)][:LIBRARY]
+        return cls(
+            robot, end_effector, clearance, margin, jax.device_get(_library(robot, drawn, end_effector))
+        )
 
     def solve(self, position, quaternion, starts, places) -> tuple[np.ndarray, np.ndarray]:
         """Joint positions (k, n) for poses (k, 3), (k, 4), and whether they are reached, (k,).
 
         places (k,) say where in the library to look for a start; where they are negative, `starts` (k, n) are taken.
         """
-        found, reached = _in_batches(self._improve, (position, quaternion, starts, places), BATCHES, CHUNK)
-        if self.clear is not None and reached.any():
-            free = _in_batches(self.clear, found[reached], BATCHES, CLEARANCE_CHUNK)
+        found, reached = _in_batches(
+            lambda items: _improve(self.robot, self.library, items, self.end_effector),
+            (position, quaternion, starts, places),
+        )
+        if self.clearance is not None and reached.any():
+            free = clear_postures(self.robot, self.clearance, self.margin, found[reached])
             reached[np.flatnonzero(reached)[~free]] = False
         return found, reached
 
 
-def _in_batches(function, batch, sizes: tuple[int, int], chunk: int):
-    """`map_batch` of host arrays in calls of two sizes alone, so that it compiles twice at most."""
+def clear_postures(robot: Robot, clearance: ClearanceModel, margin: float, q: np.ndarray) -> np.ndarray:
+    """Which postures (k, n) keep all distances of the model above the margin, m; (k,)."""
+    return _in_batches(lambda items: _clear(robot, clearance, jnp.asarray(margin), items), q)
+
+
+@program(static_argnums=2)
+def _library(robot, q, end_effector) -> Library:
+    chain = chain_to_tool(robot, end_effector)
+
+    def tool(joints):
+        pose = tool_pose(chain, joints[chain.index])
+        return Library(joints, jnp.stack(pose.position), jnp.stack(pose.quaternion))
+
+    return jax.vmap(tool)(q)
+
+
+@program(static_argnums=3)
+def _improve(robot, library, items, end_effector):
+    chain = chain_to_tool(robot, end_effector)
+
+    def one(item):
+        wanted, attitude, given, place = item
+        # The library is random, so that a slice of it is as good as a draw.
+        near = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, place, CANDIDATES), library)
+        away = jnp.sum((near.position - wanted) ** 2, axis=1) / chain.length**2
+        turned = 4 * (1 - (near.quaternion @ attitude) ** 2)
+        best = near.joint_position[jnp.argmin(away + turned)]
+        start = jnp.where(place >= 0, best, given)
+        found, errors = descend(chain, tuple(wanted), tuple(attitude), start, ITERATIONS)
+        return found, (errors[0] <= TOLERANCE) & (errors[1] <= TOLERANCE)
+
+    return spread(one, items, chunk=CHUNK, together=True)
+
+
+@program()
+def _clear(robot, clearance, margin, q):
+    still = jnp.zeros((1, 3)), jnp.array([[1.0, 0.0, 0.0, 0.0]])
+
+    def one(joints):
+        posture = SimpleNamespace(
+            base_position=still[0], base_quaternion=still[1], joint_position=joints[None]
+        )
+        return jnp.all(clearances(clearance, robot, posture) > margin)
+
+    return spread(one, q, chunk=CLEARANCE_CHUNK, together=True)
+
+
+def _in_batches(function: Callable, batch):
+    """A compiled function of host arrays in calls of two sizes alone, on all devices."""
     leaves, structure = jax.tree.flatten(batch)
     count, done, parts = len(leaves[0]), 0, []
-    large, small = sizes
+    large, small = BATCHES
     while done < count:
         size = large if count - done > large // 2 else small
         index = np.minimum(np.arange(done, done + size), count - 1)
         part = structure.unflatten([leaf[index] for leaf in leaves])
-        results = jax.device_get(map_batch(function, part, chunk=chunk))
+        with all_devices():
+            results = jax.device_get(function(part))
         parts.append(jax.tree.map(lambda x, left=count - done: np.asarray(x)[:left], results))
         done += size
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)
@@ -120,7 +164,7 @@ def search_poses(
         left = np.flatnonzero(~reached)
         if not len(left):
             break
-        places = random.integers(0, searcher.library_size - CANDIDATES, len(left))
+        places = random.integers(0, len(searcher.library.position) - CANDIDATES, len(left))
         q, met = searcher.solve(position[left], quaternion[left], found[left], places)
         found[left[met]], reached[left[met]] = q[met], True
     return found, reached
@@ -130,9 +174,9 @@ def search_block(
     searcher: Searcher, grid: PoseGrid, quaternion: np.ndarray, cells: np.ndarray, seed: tuple[int, int]
 ) -> np.ndarray:
     """Which attitudes (a,) are reached in cells of these indices (c, 3): (c, a). Drawn from the seed alone."""
-    random = np.random.default_rng(seed)
+    random, chain = np.random.default_rng(seed), chain_to_tool(searcher.robot, searcher.end_effector)
     positions, rotations = grid.positions(cells), grid.rotation.reshape(-1, 3, 3)
-    possible = within_last_joint(searcher.robot.name, searcher.chain, positions, rotations).reshape(-1)
+    possible = within_last_joint(searcher.robot.name, chain, positions, rotations).reshape(-1)
     position, attitude = np.repeat(positions, len(quaternion), axis=0), np.tile(quaternion, (len(cells), 1))
     found = np.zeros((len(possible), searcher.robot.num_joints))
     reached = np.zeros(len(possible), dtype=bool)

@@ -55,9 +55,9 @@ def draw_capability_slice(
     x, y = capability.axes[across], capability.axes[up]
     figure = new_figure(_WIDTH * min(1.3, max(0.5, np.ptp(y) / np.ptp(x))) * 0.8, width=_WIDTH)
     axes = figure.subplots()
-    levels = np.linspace(0, 1, 11)
-    # Nothing is drawn where nothing is reached.
-    drawn = axes.contourf(x, y, np.ma.masked_less_equal(values.T, 1e-9), levels=levels, cmap=_COLOURS)
+    # Nothing is filled where next to nothing is reached.
+    levels = np.concatenate([[0.02], np.linspace(0.1, 1, 10)])
+    drawn = axes.contourf(x, y, values.T, levels=levels, cmap=_COLOURS, vmin=0, vmax=1)
     axes.contour(x, y, values.T, levels=levels[1:-1], colors="white", linewidths=0.3)
     if robot is not None:
         _draw_arm(axes, _scene(robot, joint_position), across, up)
@@ -65,7 +65,7 @@ def draw_capability_slice(
     axes.set_xlabel(f"{'xyz'[across]} [m]")
     axes.set_ylabel(f"{'xyz'[up]} [m]")
     axes.set_title(f"{capability.robot}: {normal} = {at:.3g} m in the base frame")
-    figure.colorbar(drawn, ax=axes, label=_LABEL, ticks=levels[::2])
+    figure.colorbar(drawn, ax=axes, label=_LABEL, ticks=np.linspace(0.2, 1, 5))
     return figure
 
 
@@ -139,10 +139,11 @@ def draw_capability_space(
         marker="s",
         linewidths=0,
         zorder=1,
+        depthshade=False,
     )
     draw_solids(axes, solids, towards, 0.02 * np.ptp(corners, axis=0).max(), 3)
     figure.set_layout_engine("none")
-    axes.set_position((0.03, -0.03, 0.81, 1.04))
+    axes.set_position((0.06, -0.02, 0.72, 1.0))
     figure.suptitle(
         f"{capability.robot}: the far half of the map, cells of {1e2 * float(capability.spacing):.3g} cm",
         y=0.96,

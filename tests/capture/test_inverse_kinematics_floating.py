@@ -71,6 +71,7 @@ def test_the_base_has_moved(confirmed):
     assert moved[np.asarray(found.success)].min() > 1e-3
 
 
+@pytest.mark.slow
 def test_a_held_base_gives_the_solution_of_a_still_one(robots):
     robot = robots["wu_2018_6dof"]
     q = jnp.array([0.3, -0.6, -0.9, 0.2, 0.8, -0.4])

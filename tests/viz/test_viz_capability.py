@@ -44,8 +44,8 @@ def test_a_slice_has_the_plane_its_units_and_the_arm(capability, robots):
         [path.vertices for path in axes.collections[0].get_paths() if len(path.vertices)]
     )
     distance = np.linalg.norm(contours - [0.7, -1.5], axis=1)
-    # Nothing is filled beyond the cells next to those that are reached.
-    assert distance.max() < 1.5 + 0.4 * np.sqrt(2)
+    # The lowest contour is the made-up share's circle of 2 %, but for the cells' size.
+    np.testing.assert_allclose(distance.max(), 1.5 * 0.98, atol=0.2)
     between = draw_capability_slice(capability, "z", -1.3)
     assert between.axes[0].get_ylabel() == "y [m]"
 
