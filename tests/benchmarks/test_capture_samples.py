@@ -58,9 +58,18 @@ def test_lines_are_kept_and_a_torn_one_is_left_out(tmp_path):
 
 
 def test_the_page_counts_what_was_solved_first_or_second():
-    line = {"errors": [1e-6] * 4, "violations": {"clearance": 0.5}, "attempts": 1, "duration": 20.0, "jacobians": 9}
+    line = {
+        "errors": [1e-6] * 4,
+        "violations": {"clearance": 0.5},
+        "attempts": 1,
+        "duration": 20.0,
+        "jacobians": 9,
+    }
     first = [{**line, "number": n, "code": code, "seconds": 0.5} for n, code in enumerate((0, 0, 5, 5))]
-    again = [{**line, "number": 2, "code": 0, "seconds": 3.0}, {**line, "number": 3, "code": 5, "seconds": 4.0}]
+    again = [
+        {**line, "number": 2, "code": 0, "seconds": 3.0},
+        {**line, "number": 3, "code": 5, "seconds": 4.0},
+    ]
     verdicts = [{"reason": r} for r in (0, 0, 2, 0, 3, 0)]
     text = tables([CaptureSet("first", "floating", verdicts, first, again)])
     assert "| first, base floating | 4 | 50.0 % | 75.0 % | 0.500 | 3.50 |" in text
