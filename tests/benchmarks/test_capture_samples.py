@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from experiments.captures import sampling
 from experiments.captures.page import CaptureSet, tables
 from experiments.captures.work import feasible, read_lines, write_line
