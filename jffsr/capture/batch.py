@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jffsr.compiling import program
@@ -63,7 +64,7 @@ def _go_on(problems: Problem, states: RestorationState, method: Restoration) -> 
         def step(state, _):
             following = method.step(problem, state)
             ended = state.progress.converged
-            return jax.tree.map(lambda old, new: jax.numpy.where(ended, old, new), state, following), None
+            return jax.tree.map(lambda old, new: jnp.where(ended, old, new), state, following), None
 
         return jax.lax.scan(step, state, length=_STEPS)[0]
 
@@ -135,13 +136,14 @@ def restore_many(
             on_progress(*work.counts())
 
 
-def _exchanged(states: RestorationState, begun: RestorationState, fresh: np.ndarray) -> RestorationState:
+@jax.jit
+def _exchanged(states: RestorationState, begun: RestorationState, fresh: Array) -> RestorationState:
     """The states with those of fresh lanes exchanged for ones that begin."""
 
     def choose(old, new):
         if jax.dtypes.issubdtype(old.dtype, jax.dtypes.prng_key):
             return old
-        return jax.numpy.where(fresh.reshape((-1,) + (1,) * (old.ndim - 1)), new, old)
+        return jnp.where(fresh.reshape((-1,) + (1,) * (old.ndim - 1)), new, old)
 
     return jax.tree.map(choose, states, begun)
 
