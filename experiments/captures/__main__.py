@@ -15,6 +15,7 @@ from experiments.captures.page import CaptureSet, draw, tables
 from experiments.captures.sampling import read_seed
 from experiments.captures.work import feasible, is_captured, planned, planned_again, read_lines, sampled
 from experiments.pages import fill
+from jffsr.compiling.keeping import keep_programs
 from jffsr.dynamics.base_mode import ATTITUDE_HELD, FLOATING
 
 SETS = (("first", FLOATING), ("second", FLOATING), ("first", ATTITUDE_HELD))
@@ -31,6 +32,7 @@ def main() -> None:
     parser.add_argument("--redraw", action="store_true", help="from the lines kept in --folder alone")
     arguments = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
+    keep_programs()
     folder = Path(arguments.folder)
     found = []
     for name, mode in SETS:

@@ -30,7 +30,9 @@ SETTINGS = CaptureSettings(tolerance=1e-4, margin=0.02)
 AGAIN = replace(
     SETTINGS,
     candidates=CandidateSettings(times=8, apart=2.0, starts=16, postures=6, seed=2),
-    control_points=10,
+    control_points=12,
+    num_steps=100,
+    windows=16,
     most_steps=120,
 )
 """For those that the first settings do not solve: more times, more postures, more freedom."""

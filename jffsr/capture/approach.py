@@ -29,14 +29,16 @@ HALF_ANGLE = float(np.deg2rad(30.0))
 class ApproachCone:
     """The constraint that the relative velocity lies within half_angle, rad, of the grasp frame's x axis.
 
-    It holds at the last `samples` (static) samples before the end. Inequalities are in units of `speed`, m/s.
+    It holds at `instants` (static) evenly over the last `share` (static) of the motion, contact left out: the samples
+    nearest to these, so that a finer grid has them too. Inequalities are in units of `speed`, m/s.
     """
 
     path: GraspPath
     half_angle: Array | float = HALF_ANGLE
     speed: Array | float = 0.01
     tolerance: Array | float = 1e-3
-    samples: int = field(default=5, metadata={"static": True})
+    instants: int = field(default=5, metadata={"static": True})
+    share: float = field(default=0.1, metadata={"static": True})
     end_effector: str | None = field(default=None, metadata={"static": True})
     name: str = field(default="approach_cone", metadata={"static": True})
 
@@ -45,15 +47,17 @@ class ApproachCone:
         return jnp.zeros(0)
 
     def inequality(self, robot: Robot, motion: Motion) -> Vector:
-        """|v| cos(gamma) - n_x' v over `speed`, (samples,)."""
-        tool = tool_samples(robot, motion, self.end_effector, last=self.samples + 1)
-        duration = tool.time[-1]
+        """|v| cos(gamma) - n_x' v over `speed`, (instants,)."""
+        steps = len(motion.time) - 1
+        before = np.maximum(1, np.rint(steps * self.share * np.arange(self.instants, 0, -1) / self.instants))
+        tool = tool_samples(robot, motion, self.end_effector, steps - before.astype(int))
+        duration = motion.time[-1]
 
         def one(time: Scalar, position: Vector3, twist: Array) -> Scalar:
             along, length = approach_velocity(self.path, time, duration, position, twist[:3])
             return length * jnp.cos(self.half_angle) - along
 
-        missed = jax.vmap(one)(tool.time[:-1], tool.position[:-1], tool.twist[:-1])
+        missed = jax.vmap(one)(tool.time, tool.position, tool.twist)
         return missed / self.speed
 
 

@@ -44,7 +44,7 @@ class GraspMatch:
 
 def grasp_error(robot: Robot, motion: Motion, path: GraspPath, end_effector: str | None = None) -> Vector:
     """Errors (12,) of the tool at a motion's end: position, m, rotation vector, rad, velocity, m/s and rad/s."""
-    tool = tool_samples(robot, motion, end_effector, last=1)[0]
+    tool = tool_samples(robot, motion, end_effector, [len(motion.time) - 1])[0]
     position, quaternion, twist = path.frame(tool.time, tool.time)
     turn = quaternion_multiply(quaternion_conjugate(quaternion), tool.quaternion)
     return jnp.concatenate(

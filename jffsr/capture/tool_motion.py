@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jffsr.dynamics.kinematics import end_effector_pose, jacobians, kinematics
 from jffsr.robots.robot import Robot
@@ -29,10 +30,10 @@ class ToolSamples:
 
 
 def tool_samples(
-    robot: Robot, motion: Motion, end_effector: str | None = None, last: int | None = None
+    robot: Robot, motion: Motion, end_effector: str | None = None, samples: np.ndarray | None = None
 ) -> ToolSamples:
-    """The tool at the last `last` (static) samples of a motion, the first among them first; None means all."""
-    first = 0 if last is None else len(motion.time) - last
+    """The tool at these samples (k,) of a motion, by their numbers (static); None means all."""
+    chosen = np.arange(len(motion.time)) if samples is None else np.asarray(samples)
 
     def one(position: Array, quaternion: Array, twist: Array, q: Array, qd: Array):
         kin = kinematics(robot, State(position, quaternion, q))
@@ -46,5 +47,5 @@ def tool_samples(
         motion.joint_position,
         motion.joint_velocity,
     )
-    position, quaternion, twist = jax.vmap(one)(*(jnp.asarray(x)[first:] for x in fields))
-    return ToolSamples(jnp.asarray(motion.time)[first:], position, quaternion, twist)
+    position, quaternion, twist = jax.vmap(one)(*(jnp.asarray(x)[chosen] for x in fields))
+    return ToolSamples(jnp.asarray(motion.time)[chosen], position, quaternion, twist)

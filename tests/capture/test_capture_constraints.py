@@ -103,7 +103,8 @@ def test_relative_velocity_is_the_derivative_of_the_place_in_the_grasp_frame(mov
     np.testing.assert_allclose(along[2:-2], velocity[:, 0], atol=4e-6)
     np.testing.assert_allclose(length[2:-2], np.linalg.norm(velocity, axis=1), atol=4e-6)
     # The corrected corridor: the component along the axis is at least |v| cos(gamma).
-    np.testing.assert_allclose(cone, (length * np.cos(0.5) - along)[-6:-1] / 0.01, atol=1e-9)
+    at = NUM_STEPS - NUM_STEPS // 50 * np.array([5, 4, 3, 2, 1])
+    np.testing.assert_allclose(cone, (length * np.cos(0.5) - along)[at] / 0.01, atol=1e-9)
 
 
 def test_a_spline_ends_as_it_is_told(problem):
