@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-optimised check-slow check-physics check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -49,6 +49,13 @@ check-slow: $(STAMP)  ## run the heavier checks
 check-physics: $(STAMP)  ## check 1,000 random robots against MuJoCo and the laws of mechanics
 	$(VENV_PYTHON) tests/physics/check_physics.py
 	$(PYTEST) -m physics $(PYTEST_ARGS)
+
+check-capture: $(STAMP)  ## run the heavier checks of target, clearance and capture, and plan 100 random captures
+	$(PYTEST) -m slow tests/target tests/clearance tests/capture $(PYTEST_ARGS)
+	$(VENV_PYTHON) -m experiments.captures --count 100 --folder runs/captures-check --check
+
+captures: $(STAMP)  ## plan a thousand random captures twice (goes on where it was stopped)
+	$(VENV_PYTHON) -m experiments.captures
 
 check-native: $(STAMP)  ## check the benchmark's C++ kernel against the package (needs a C++ compiler)
 	$(PYTEST) -m native $(PYTEST_ARGS)

@@ -20,6 +20,8 @@ from jffsr.dynamics.base_mode import ATTITUDE_HELD, FLOATING
 
 SETS = (("first", FLOATING), ("second", FLOATING), ("first", ATTITUDE_HELD))
 """Two sets of samples, and the first once more with the base's attitude held, as the anchor has it."""
+LEAST_SHARE = 0.95
+"""Captured in each set, below which `--check` fails."""
 
 
 def main() -> None:
@@ -30,6 +32,7 @@ def main() -> None:
     parser.add_argument("--folder", default="runs/captures")
     parser.add_argument("--out", default="docs/benchmarks/captures.md")
     parser.add_argument("--redraw", action="store_true", help="from the lines kept in --folder alone")
+    parser.add_argument("--check", action="store_true", help="write no page; fail where fewer than 95 % are captured")
     arguments = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     keep_programs()
@@ -45,6 +48,9 @@ def main() -> None:
             failed = [line["number"] for line in lines if not is_captured(line)]
             planned_again(again, read_seed(name), failed, mode)
         found.append(CaptureSet(name, mode, *map(read_lines, (samples, first, again))))
+    if arguments.check:
+        print(tables(found))
+        raise SystemExit(any(one.share < LEAST_SHARE for one in found))
     page = Path(arguments.out)
     page.parent.mkdir(parents=True, exist_ok=True)
     fill(page, tables(found), "A thousand captures")

@@ -35,6 +35,11 @@ class CaptureSet:
         """The line of each capture that was solved, first or second."""
         return [line for line in (*self.first, *self.again) if is_captured(line)]
 
+    @property
+    def share(self) -> float:
+        """Share of the captures that were solved."""
+        return len(self.solved) / len(self.first)
+
 
 def tables(sets: list[CaptureSet]) -> str:
     """All tables."""
@@ -48,7 +53,7 @@ def tables(sets: list[CaptureSet]) -> str:
         at_once = sum(map(is_captured, one.first))
         alone = f"{np.median([x['seconds'] for x in one.again]):.2f}" if one.again else "-"
         rows.append(
-            f"| {one.title} | {count} | {100 * at_once / count:.1f} % | {100 * len(one.solved) / count:.1f} % | "
+            f"| {one.title} | {count} | {100 * at_once / count:.1f} % | {100 * one.share:.1f} % | "
             f"{np.mean([x['seconds'] for x in one.first]):.3f} | {alone} |"
         )
     parts = ["\n".join(rows), _errors(sets), _rejections(sets), _failures(sets)]

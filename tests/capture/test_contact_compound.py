@@ -116,6 +116,7 @@ def test_a_target_on_the_base_moves_its_centre_of_mass():
     np.testing.assert_allclose(jffsr.end_effector_pose(found.robot, kin, "tip")[0], [3.5, 0, 0], atol=1e-14)
 
 
+@pytest.mark.slow
 def test_gradients_are_finite_differences():
     """Of the base's rate and the energy lost, by the target's mass, inertia and spin and the first joint."""
 

@@ -102,6 +102,7 @@ def test_curves_and_minima_are_those_of_the_formula(servicer, published):
     assert found.candidate.value == min(c.value for c in found.candidates)
 
 
+@pytest.mark.slow
 def test_the_best_of_several_frames_is_confirmed_by_the_floating_base(servicer):
     robot, state = servicer
     away = ((0.4, 0.0, 0.4), (0.0, 0.0, 1.0, 0.0))

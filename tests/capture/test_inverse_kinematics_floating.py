@@ -30,7 +30,9 @@ def reference(robot, state, q, momentum):
     return jit(jax.vmap(one))(q)
 
 
-@pytest.fixture(scope="module", params=[0.0, 1.0], ids=["at rest", "with momentum"])
+@pytest.fixture(
+    scope="module", params=[pytest.param(0.0, marks=pytest.mark.slow), 1.0], ids=["at rest", "with momentum"]
+)
 def confirmed(request, robots):
     """The seven-axis servicer, poses in I that it can reach, and what was found for them."""
     robot = robots["servicer_7dof"]

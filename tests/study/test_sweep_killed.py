@@ -85,6 +85,7 @@ def check_killed(tmp_path: Path, sweep: str, kills: int, most: int, points: int)
     assert not list(folder.glob("**/.*.part"))
 
 
+@pytest.mark.slow
 @pytest.mark.sweep
 def test_killed_twice(tmp_path):
     check_killed(tmp_path, write_sweep(tmp_path, 12, 0), kills=2, most=3, points=12)

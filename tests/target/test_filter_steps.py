@@ -96,6 +96,7 @@ def test_the_truth_predicted_is_the_targets_motion():
     assert abs(float(predicted.time) - 31.4) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_predictions_covariance_is_that_of_many_predictions():
     truth = true_estimate(TARGET, START)
     deviation = 1e-3 * np.repeat([1.0, 0.2, 1.0, 1.0, 0.3, 1.0], [3, 3, 5, 3, 3, 3])

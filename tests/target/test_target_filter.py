@@ -53,6 +53,7 @@ def followed():
     return observe_target(target, states, camera, jax.random.key(3)), run, states
 
 
+@pytest.mark.slow
 def test_outliers_are_refused_and_change_little(followed):
     seen, run, states = followed
     clean = run(seen)

@@ -116,6 +116,7 @@ def refit_start(poses, start, until, interval, prior, noise):
     )
 
 
+@pytest.mark.slow
 def test_where_the_prior_knows_almost_all_nothing_is_curved():
     known = {f"{what}_deviation": 1e-3 for what in ("angular_velocity", "inertia", "velocity", "offset")}
     prior = TargetPrior.create((0.1, -0.05, 0.2), inertia=(0.7, 0.9, 1.0), **known)
