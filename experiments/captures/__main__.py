@@ -32,7 +32,9 @@ def main() -> None:
     parser.add_argument("--folder", default="runs/captures")
     parser.add_argument("--out", default="docs/benchmarks/captures.md")
     parser.add_argument("--redraw", action="store_true", help="from the lines kept in --folder alone")
-    parser.add_argument("--check", action="store_true", help="write no page; fail where fewer than 95 % are captured")
+    parser.add_argument(
+        "--check", action="store_true", help="write no page; fail where fewer than 95 % are captured"
+    )
     arguments = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     keep_programs()

@@ -11,6 +11,8 @@ import numpy as np
 from experiments.captures.sampling import REASONS
 from experiments.captures.work import is_captured
 from jffsr.capture.outcome import CaptureCode
+from jffsr.viz.save import save_figure
+from jffsr.viz.style import WIDTH, legend_above, line_look, new_figure, styled
 
 ERRORS = ("position, m", "attitude, rad", "velocity, m/s", "angular velocity, rad/s")
 
@@ -81,43 +83,42 @@ def _rejections(sets: list[CaptureSet]) -> str:
 
 def _failures(sets: list[CaptureSet]) -> str:
     rows = [
-        "| not solved | number | what became of it | constraint missed most, and by how much |",
-        "|---|---|---|---|",
+        "| not solved, of which | constraint missed most | captures | earliest, latest time tried last, s | numbers |",
+        "|---|---|---|---|---|",
     ]
     for one in sets:
         last = {line["number"]: line for line in (*one.first, *one.again)}
-        for number, line in sorted(last.items()):
+        groups: dict[tuple[str, str], list[dict]] = {}
+        for line in last.values():
             if not is_captured(line):
-                worst, missed = max(line["violations"].items(), key=lambda item: item[1])
+                worst = max(line["violations"], key=line["violations"].get)
                 code = CaptureCode(line["code"]).name.lower().replace("_", " ")
-                rows.append(f"| {one.title} | {number} | {code} | {worst}, {missed:.2g} |")
+                groups.setdefault((code, worst), []).append(line)
+        for (code, worst), lines in sorted(groups.items()):
+            times = [line["duration"] for line in lines]
+            numbers = ", ".join(
+                str(line["number"]) for line in sorted(lines, key=lambda line: line["number"])
+            )
+            rows.append(
+                f"| {one.title}: {code} | {worst} | {len(lines)} | {min(times):.1f}, {max(times):.1f} | {numbers} |"
+            )
     return "\n".join(rows)
 
 
+@styled
 def draw(path: Path, sets: list[CaptureSet]) -> None:
-    """Shares solved over the attempts, and when the captures take place."""
-    import matplotlib.pyplot as plt
-
-    from jffsr.viz.save import save_figure
-
+    """Shares solved over the attempts of the first try, and when the captures take place; a PNG."""
     sets = [one for one in sets if one.first]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.4), layout="constrained")
-    for one in sets:
-        attempts = np.sort([line["attempts"] if is_captured(line) else np.inf for line in one.first])
-        share = np.arange(1, len(attempts) + 1) / len(attempts)
-        left.step(
-            [*attempts[np.isfinite(attempts)]],
-            100 * share[np.isfinite(attempts)],
-            where="post",
-            label=one.title,
-        )
-        right.hist(
-            [line["duration"] for line in one.solved],
-            bins=np.arange(15, 61, 3),
-            histtype="step",
-            label=one.title,
-        )
-    left.set(xlabel="attempts", ylabel="captures solved (%)", ylim=(0, 101))
-    right.set(xlabel="grasp time (s)", ylabel="captures")
-    left.legend(frameon=False)
-    save_figure(figure, path)
+    figure = new_figure(2.6, 2 * WIDTH)
+    left, right = figure.subplots(1, 2)
+    for index, one in enumerate(sets):
+        attempts = np.array([line["attempts"] for line in one.first if is_captured(line)])
+        counts = np.arange(1, attempts.max() + 1)
+        shares = [100 * np.sum(attempts <= count) / len(one.first) for count in counts]
+        left.plot(counts, shares, marker=".", **line_look(index))
+        durations = [line["duration"] for line in one.solved]
+        right.hist(durations, bins=np.arange(15, 61, 3), histtype="step", **line_look(index))
+    left.set(xlabel="starts tried", ylabel="captured [%]")
+    right.set(xlabel="grasp time [s]", ylabel="captures")
+    legend_above(figure, left.lines, [one.title for one in sets])
+    save_figure(figure, path.with_suffix(""), ("png",))

@@ -75,4 +75,4 @@ def test_the_page_counts_what_was_solved_first_or_second():
     text = tables([CaptureSet("first", "floating", verdicts, first, again)])
     assert "| first, base floating | 4 | 50.0 % | 75.0 % | 0.500 | 3.50 |" in text
     assert "| first | 6 | 66.7 % | 0 | 1 | 1 | 0 | 0 |" in text
-    assert "| first, base floating | 3 | not found | clearance, 0.5 |" in text
+    assert "| first, base floating: not found | clearance | 1 | 20.0, 20.0 | 3 |" in text
