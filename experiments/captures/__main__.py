@@ -13,13 +13,14 @@ import jax
 
 from experiments.captures.page import CaptureSet, draw, tables
 from experiments.captures.sampling import read_seed
-from experiments.captures.work import feasible, is_captured, planned, planned_again, read_lines, sampled
+from experiments.captures.work import AGAIN, SETTINGS, feasible, is_captured, planned, read_lines, sampled
 from experiments.pages import fill
 from jffsr.compiling.keeping import keep_programs
 from jffsr.dynamics.base_mode import ATTITUDE_HELD, FLOATING
 
 SETS = (("first", FLOATING), ("second", FLOATING), ("first", ATTITUDE_HELD))
 """Two sets of samples, and the first once more with the base's attitude held, as the anchor has it."""
+AGAIN_PART = 16
 LEAST_SHARE = 0.95
 """Captured in each set, below which `--check` fails."""
 
@@ -28,7 +29,8 @@ def main() -> None:
     """Sample, plan, plan again what failed, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=1000, help="feasible captures of each set")
-    parser.add_argument("--part", type=int, default=128, help="captures planned at once")
+    parser.add_argument("--part", type=int, default=64, help="captures planned at once")
+    parser.add_argument("--sets", default="0,1,2", help="which sets, by commas")
     parser.add_argument("--folder", default="runs/captures")
     parser.add_argument("--out", default="docs/benchmarks/captures.md")
     parser.add_argument("--redraw", action="store_true", help="from the lines kept in --folder alone")
@@ -40,15 +42,15 @@ def main() -> None:
     keep_programs()
     folder = Path(arguments.folder)
     found = []
-    for name, mode in SETS:
+    for name, mode in (SETS[int(number)] for number in arguments.sets.split(",")):
         samples, first, again = (
             folder / f"{name}{part}.jsonl" for part in ("_samples", f"_{mode}", f"_{mode}_again")
         )
         if not arguments.redraw:
             numbers = feasible(sampled(samples, read_seed(name), arguments.count), arguments.count)
-            lines = planned(first, read_seed(name), numbers, arguments.part, mode)
+            lines = planned(first, read_seed(name), numbers, arguments.part, mode, SETTINGS)
             failed = [line["number"] for line in lines if not is_captured(line)]
-            planned_again(again, read_seed(name), failed, mode)
+            planned(again, read_seed(name), failed, AGAIN_PART, mode, AGAIN)
         found.append(CaptureSet(name, mode, *map(read_lines, (samples, first, again))))
     if arguments.check:
         print(tables(found))

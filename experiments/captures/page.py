@@ -47,13 +47,13 @@ def tables(sets: list[CaptureSet]) -> str:
     """All tables."""
     sets = [one for one in sets if one.first]
     rows = [
-        "| set | captures | solved at once | solved in all | s a plan, in batches | s a plan, tried again alone |",
+        "| set | captures | solved at once | solved in all | s a plan | s a plan tried again |",
         "|---|---|---|---|---|---|",
     ]
     for one in sets:
         count = len(one.first)
         at_once = sum(map(is_captured, one.first))
-        alone = f"{np.median([x['seconds'] for x in one.again]):.2f}" if one.again else "-"
+        alone = f"{np.mean([x['seconds'] for x in one.again]):.2f}" if one.again else "not tried"
         rows.append(
             f"| {one.title} | {count} | {100 * at_once / count:.1f} % | {100 * one.share:.1f} % | "
             f"{np.mean([x['seconds'] for x in one.first]):.3f} | {alone} |"

@@ -1,4 +1,9 @@
-"""One capture: checked, sought until its constraints are kept, then made better by the augmented Lagrangian."""
+"""One capture: checked, sought until its constraints are kept, then made better level by level.
+
+To be made better, an index is one more constraint: at most some level. Several levels below the one that is kept are
+tried side by side, from the free numbers that keep it; the lowest that can be restored is kept, and the next ones lie
+between it and the next lower, which could not.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +13,18 @@ from dataclasses import dataclass, replace
 import jax
 import numpy as np
 
+from jffsr.capture.batch import restore_many
 from jffsr.capture.captures import CaptureSettings, CaptureTask, plan_captures, reviewed
 from jffsr.capture.checks import check_capture
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.match import grasp_error
 from jffsr.capture.outcome import CaptureCode, CaptureResult, explain_capture
-from jffsr.capture.terms import BaseDisturbance
+from jffsr.capture.terms import BaseDisturbance, IndexAtMost
 from jffsr.clearance.model import ClearanceModel
 from jffsr.compiling import program
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.objectives.terms import Term
-from jffsr.optimizers.augmented import AugmentedLagrangian
-from jffsr.optimizers.constraints import Feasible
-from jffsr.optimizers.driver import Phase, Stop, run
-from jffsr.optimizers.gradient import GradientDescent
-from jffsr.optimizers.interface import Population
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import ResultCode
 from jffsr.planning.verification import Verification
@@ -33,6 +34,9 @@ from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
 from jffsr.target.prediction import GraspPrediction
 from jffsr.types import Array
+
+LEVELS = 8
+"""Tried side by side."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ def plan_capture(
     settings: CaptureSettings | None = None,
     *,
     terms: Sequence[Term] | None = None,
-    improve: int = 200,
+    improve: int = 3,
     geometry: Geometry | None = None,
     prediction: GraspPrediction | None = None,
     end_effector: str | None = None,
@@ -81,10 +85,10 @@ def plan_capture(
 ) -> CapturePlan:
     """Plan the capture of a grasp frame by a robot at rest of its joints.
 
-    A plan that keeps every constraint is sought from several grasp times and postures; `improve` gradients then make
-    the sum of `terms` small (the base's disturbance by default), and the better plan is taken only where the re-run
-    says that it keeps them too. geometry of the target and the prediction behind its motion are looked at beforehand.
-    Raises InputError as `plan_captures`; what cannot be done is told by the result's code.
+    A plan that keeps every constraint is sought from several grasp times and postures; `improve` rounds of levels then
+    make the sum of `terms` small (the base's disturbance by default), and a better plan is taken only where the re-run
+    says that it keeps the constraints too. geometry of the target and the prediction behind its motion are looked at
+    beforehand. Raises InputError as `plan_captures`; what cannot be done is told by the result's code.
     """
     wrong = check_capture(robot, path, initial_state, clearance, geometry, prediction)
     if wrong is not None:
@@ -109,16 +113,28 @@ def plan_capture(
     plan = _told(problem, free, result, settings, end_effector)
     if not result.success or not improve:
         return plan
-    descent = AugmentedLagrangian(GradientDescent(starts=1))
-    better = run(
-        [Phase("constrained", descent, Stop(iterations=float(improve)))],
-        Feasible(problem),
-        jax.random.key(0),
-        population=Population(free[None], np.full(1, np.inf)),
-    )
-    improved = _told(problem, np.asarray(better.best_position), None, settings, end_effector)
-    chosen = improved if improved.result.success and improved.cost < plan.cost else plan
-    return replace(chosen, before=plan.cost)
+    best = plan
+    low, high = min(0.0, 2 * plan.cost), plan.cost
+    for _ in range(improve):
+        levels = np.linspace(low, high, LEVELS + 2)[1:-1]
+        if high <= low:
+            break
+        limited = [_at_most(problem, level) for level in levels]
+        starts = np.broadcast_to(best.free, (LEVELS, 1, len(free)))
+        found = restore_many(limited, starts, lanes=LEVELS, most_steps=settings.most_steps)
+        kept = np.flatnonzero(found.kept)
+        low = levels[kept[0] - 1] if len(kept) and kept[0] else low if len(kept) else levels[-1]
+        for number in kept:
+            better = _told(problem, found.free[number], None, settings, end_effector)
+            if better.result.success and better.cost < best.cost:
+                best, high = better, better.cost
+                break
+    return replace(best, before=plan.cost)
+
+
+def _at_most(problem: Problem, level: float) -> Problem:
+    limit = IndexAtMost(problem.objective, np.asarray(level))
+    return replace(problem, constraints=(*problem.constraints, limit))
 
 
 def _told(

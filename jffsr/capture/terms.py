@@ -10,6 +10,7 @@ import numpy as np
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.manipulability import FORCE, grasped_jacobian, manipulability
+from jffsr.objectives.composite import CompositeIndex
 from jffsr.objectives.smoothing import Smoothing
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -82,3 +83,22 @@ class LostManipulability:
         rotation = quaternion_to_matrix(self.path.frame(duration, duration)[1])
         wrench = jnp.asarray(self.wrench)
         return jnp.concatenate([rotation @ wrench[:3], rotation @ wrench[3:]])
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class IndexAtMost:
+    """The constraint that an index is at most `level`, which may be below zero; in units of the index."""
+
+    index: CompositeIndex
+    level: Array | float
+    tolerance: Array | float = 1e-6
+    name: str = field(default="index_at_most", metadata={"static": True})
+
+    def equality(self, robot: Robot, motion: Motion) -> Vector:
+        """None."""
+        return jnp.zeros(0)
+
+    def inequality(self, robot: Robot, motion: Motion) -> Vector:
+        """The published index less the level, (1,)."""
+        return (self.index.value(robot, motion) - self.level)[None]
