@@ -1,12 +1,11 @@
 """Random captures and the rule by which one counts as feasible. Nothing here knows of the planner.
 
 A sample is a box of random sides, turned at random, that turns at up to 5 degrees a second before the robot, with a
-handle standing out of one face. Its inertia is that of a box, or rather of a body of the same triangle: the three
-moments are drawn from what rigid bodies can have. A sample is feasible where, at one of a few times when the handle
-looks at the tool, there is a posture, reached by the straight joint path with the base free, inside the joint limits,
-clear of everything, and from which the tool can have the handle's velocity inside the joint rates. What stands between
-(rates and accelerations over time, the cone, clearance on the way) is left to the planner. Rejections are counted by
-the first of these that fails.
+handle standing out of one face. Its moments of inertia are drawn from what rigid bodies can have, whatever the box. A
+sample is feasible where, at one of a few times when the handle looks at the tool, there is a posture, reached by the
+straight joint path with the base free, inside the joint limits, clear of everything, and from which the tool can have
+the handle's velocity inside the joint rates. What stands between (rates and accelerations over time, the cone,
+clearance on the way) is left to the planner. Rejections are counted by the first of these that fails.
 """
 
 from __future__ import annotations
@@ -30,6 +29,7 @@ from jffsr.dynamics.kinematics import kinematics
 from jffsr.dynamics.momentum import generalized_jacobian
 from jffsr.parallel.mapping import map_batch
 from jffsr.robots.geometry import BOX, COLLISION, VISUAL, Geometry, Shape
+from jffsr.robots.stacking import stacked
 from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.target.body import Target
 from jffsr.target.target_state import TargetState
@@ -40,7 +40,7 @@ SEEDS = Path(__file__).with_name("seeds.yaml")
 ROBOT = "servicer_7dof"
 START = np.deg2rad([0.0, -60.0, 0.0, 45.0, 0.0, -15.0, 0.0])
 REACH = 3.2
-"""m, of the tool from the system's centre of mass: more than the arm can."""
+"""m, of the tool from the system's centre of mass; the arm's length bounds it by 3.52 m."""
 
 LARGEST_RATE = np.deg2rad(5.0)
 CENTRE_LOW, CENTRE_HIGH = np.array([1.5, -0.9, -2.6]), np.array([2.7, 0.9, -0.6])
@@ -160,11 +160,6 @@ def motion_of(sample: Sample, duration: float = WINDOW[1] + 1.0):
 @jax.jit
 def _moving(target: Target, state: TargetState, duration: float):
     return target_motion(target, state, duration, MOTION_STEPS)
-
-
-def stacked(items: list):
-    """Pytrees of one structure as one with a leading axis."""
-    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *items)
 
 
 @dataclass(frozen=True)

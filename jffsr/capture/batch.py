@@ -17,12 +17,13 @@ import numpy as np
 
 from jffsr.compiling import program
 from jffsr.errors import InputError
+from jffsr.optimizers.gradient import select
 from jffsr.optimizers.interface import Population
 from jffsr.optimizers.restoration import Restoration, RestorationState
 from jffsr.parallel.devices import all_devices
 from jffsr.parallel.mapping import spread
 from jffsr.planning.problem import Problem
-from jffsr.robots.stacking import first_unlike
+from jffsr.robots.stacking import first_unlike, stacked
 from jffsr.types import Array
 
 _STEPS = 6
@@ -100,7 +101,7 @@ def restore_many(
     if starts.ndim != 3 or starts.shape[0] != count or starts.shape[2] != size or not starts.shape[1]:
         raise InputError(f"starts have the shape {starts.shape}; ({count}, s, {size}) is expected")
     tasks = np.arange(count) if task_of is None else np.asarray(task_of)
-    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *problems)
+    every = stacked(problems)
     work = _Work(starts, tasks)
     method = method or Restoration(starts=1)
     lanes = min(lanes, count * starts.shape[1])
@@ -117,7 +118,7 @@ def restore_many(
         if np.all(problem_of < 0):
             return work.found()
         chosen = np.maximum(problem_of, 0)
-        batch = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], stacked)
+        batch = jax.tree.map(lambda leaf, chosen=chosen: leaf[chosen], every)
         with all_devices():
             if np.any(fresh):
                 begun = _begin(batch, point, method)
@@ -139,13 +140,7 @@ def restore_many(
 @jax.jit
 def _exchanged(states: RestorationState, begun: RestorationState, fresh: Array) -> RestorationState:
     """The states with those of fresh lanes exchanged for ones that begin."""
-
-    def choose(old, new):
-        if jax.dtypes.issubdtype(old.dtype, jax.dtypes.prng_key):
-            return old
-        return jnp.where(fresh.reshape((-1,) + (1,) * (old.ndim - 1)), new, old)
-
-    return jax.tree.map(choose, states, begun)
+    return select(fresh, begun, states)
 
 
 class _Work:

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.capture.grasp_path import GraspPath
+from jffsr.capture.grasp_time_curves import criterion
 from jffsr.capture.inverse_kinematics_floating import floating_inverse_kinematics
 from jffsr.clearance.model import ClearanceModel
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
@@ -27,10 +28,13 @@ LOOKS_AWAY = 1e6
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class GraspCandidates:
-    """time (c,), s, best first, and criterion (c,), m, LOOKS_AWAY or more where the frame looks
-    away, infinite where there is no such time; postures at each, best
-    first: joint_position (c, s, n), base_position (c, s, 3), m, base_quaternion (c, s, 4), error (c, s), m and rad
-    added, by which the straight joint path misses the grasp frame, and clearance (c, s), m, of all bodies there."""
+    """What was found, best first.
+
+    time (c,), s, best first, and criterion (c,), m, LOOKS_AWAY or more where the frame looks away, infinite where
+    there is no such time; postures at each, best first: joint_position (c, s, n), base_position (c, s, 3), m,
+    base_quaternion (c, s, 4), error (c, s), m and rad added, by which the straight joint path misses the grasp
+    frame, and clearance (c, s), m, of all bodies there.
+    """
 
     time: Array
     criterion: Array
@@ -83,7 +87,7 @@ def grasp_candidates(
         times.append(grid[best])
         criteria.append(values[best])
         values = jnp.where(jnp.abs(grid - grid[best]) < settings.apart, jnp.inf, values)
-    time, criterion = jnp.stack(times), jnp.stack(criteria)
+    time, least = jnp.stack(times), jnp.stack(criteria)
     position, quaternion, _ = jax.vmap(lambda t: path.frame(t, t))(time)
     start = jnp.concatenate([jnp.asarray(initial_state.joint_position)[None], jnp.asarray(starts)])
     # With the base given way, how long the way takes counts only under momentum; one duration must do for all.
@@ -108,7 +112,7 @@ def grasp_candidates(
             in_axes=(None, 0, 0, 0),
         )
         gap = jax.vmap(of_time)(time, found.joint_position, found.base_position, found.base_quaternion)
-    return _ranked(found, initial_state, error, gap, time, criterion, settings.postures)
+    return _ranked(found, initial_state, error, gap, time, least, settings.postures)
 
 
 def grasp_criterion(path: GraspPath, time: Scalar, tool: Vector3, value: Scalar | float = 0.0) -> Scalar:
@@ -118,9 +122,9 @@ def grasp_criterion(path: GraspPath, time: Scalar, tool: Vector3, value: Scalar 
     """
     position, quaternion, _ = path.frame(time, time)
     way = position - tool
-    along = quaternion_to_matrix(quaternion)[:, 0] @ way
-    criterion = (2 * jnp.sqrt(way @ way + 1e-24) - along) / (1 + value)
-    return jnp.where(along > 0, criterion, criterion + LOOKS_AWAY)
+    approach = quaternion_to_matrix(quaternion)[:, 0]
+    found = criterion(way, approach, value)
+    return jnp.where(approach @ way > 0, found, found + LOOKS_AWAY)
 
 
 def least_clearance(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -37,7 +36,7 @@ from jffsr.planning.problem import Problem
 from jffsr.planning.result import ResultCode, Tolerances, result_code
 from jffsr.planning.verification import Verification, verify
 from jffsr.robots.robot import Robot
-from jffsr.robots.stacking import first_unlike
+from jffsr.robots.stacking import first_unlike, stacked
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
@@ -171,11 +170,6 @@ def plan_captures(
     )
 
 
-def stacked(trees: Sequence[Any]) -> Any:
-    """Pytrees of one structure as one, with a leading axis on every array."""
-    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *trees)
-
-
 @program(static_argnums=(2, 3, 4))
 def _candidates(batch, shared, settings: CandidateSettings, end_effector, base_mode):
     """Candidates of each task, and whether its start is free of collision, (K,)."""
@@ -186,8 +180,10 @@ def _candidates(batch, shared, settings: CandidateSettings, end_effector, base_m
         found = grasp_candidates(
             robot, path, state, starts, model, settings, end_effector, momentum, base_mode
         )
-        gap = jnp.inf if model is None else least_clearance(model, robot, path, jnp.zeros(()), state)
-        return found, gap > 0
+        # When the motion begins is not known where only its end is given; the plan's own clearance sees its start.
+        if model is None or path.grasp_time is not None:
+            return found, jnp.array(True)
+        return found, least_clearance(model, robot, path, jnp.zeros(()), state) > 0
 
     return spread(one, batch)
 

@@ -38,7 +38,8 @@ def check_capture(
                 f"the grasp point {[round(float(x), 6) for x in point]} m in T lies inside the target's shape "
                 f"'{shape.name}', where no tool can go; move it out",
             )
-    if clearance is not None:
+    # Where only the grasp's time is given, where the target is at the beginning is not known.
+    if clearance is not None and path.grasp_time is None:
         begin = path.target_state(np.zeros(()), np.zeros(()))
         try:
             check_start(clearance, robot, initial_state, begin if clearance.has_target else None)

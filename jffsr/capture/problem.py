@@ -49,7 +49,7 @@ def capture_problem(
     curve. Constraints: the grasp's pose and twist to `tolerance` (m, rad, m/s, rad/s), rates and accelerations, the
     approach cone of half_angle, rad (None leaves it out), and `clearance`. terms, by default the base's disturbance,
     are what is made small; `accuracy`, the index that counts as met, is infinite: every plan that keeps the constraints
-    is a success. Raises InputError where the start lies beyond a position limit or a limit is missing.
+    is a success. Raises InputError where the start lies beyond a position limit.
     """
     limits = robot.limits
     law = ClampedBSpline.between(

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.optimizers.constraints import ConstrainedProblem, merit
+from jffsr.optimizers.gradient import select
 from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import (
     Population,
@@ -124,13 +125,8 @@ class Restoration:
             old, residual, jacobian, kept, fresh
         )
         improved = old.active & (value < old.best_value)
-        chosen = jax.tree.map(
-            lambda new, kept_: jnp.where(old.active.reshape((-1,) + (1,) * (new.ndim - 1)), new, kept_),
-            moved,
-            old,
-        )
         trials = replace(
-            chosen,
+            select(old.active, moved, old),
             best_position=jnp.where(improved[:, None], old.trial, old.best_position),
             best_value=jnp.where(improved, value, old.best_value),
         )

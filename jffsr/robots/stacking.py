@@ -27,7 +27,12 @@ def stack_robots(robots: Sequence[Robot]) -> Robot:
             f"robot {other} ('{robots[other].name}') differs from robot 0 ('{robots[0].name}') in more than "
             f"numbers (its topology, names, shapes, or the shape of an array)"
         )
-    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *robots)
+    return stacked(robots)
+
+
+def stacked(trees: Sequence[Any]) -> Any:
+    """Pytrees of one structure as one, with a leading axis on every number, host arrays; see `first_unlike`."""
+    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *trees)
 
 
 def first_unlike(trees: Sequence[Any]) -> int | None:
