@@ -170,7 +170,7 @@ def _motion(config, study: CaptureStudy, found: PlannedCapture, plan: CapturePla
     if model is not None:
         apart = distances(model, robot, motion, seen.target)
         variables["clearance"] = of(("pair", "time"), apart, "m", "signed distance of two bodies")
-        coordinates["pair"] = ("pair", [" - ".join(pair) for pair in model.pair_names])
+        coordinates["pair"] = ("pair", [" and ".join(pair) for pair in model.pair_names])
     if found.observed is not None:
         true = jax.device_get(_followed(robot, motion, found.true_path, study.end_effector))
         variables |= {

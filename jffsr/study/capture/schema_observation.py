@@ -99,7 +99,7 @@ class Convergence(Section):
 
 
 class Observation(Section):
-    """The target is observed for `duration`, s, before the robot starts, and planned for where it is predicted to be."""
+    """The target is observed for `duration`, s, before the robot starts, and planned for as it is predicted."""
 
     duration: Annotated[float, number(gt=0, le=1e4, unit="s")] = 30.0
     camera: Camera = Camera(attitude_deviation_deg=2.0)

@@ -1,4 +1,4 @@
-"""The sections `grasp_time`, `planner`, `objective` and `front`: when to grasp, how a motion is sought, what is good."""
+"""The sections `grasp_time`, `planner`, `objective`, `front`: when to grasp, how a motion is sought, what is good."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class GraspTime(Section):
 
     time: `free`, the planner chooses within the window, beginning at the best times of the criterion; `criterion`, its
     least value decides; or a number. map: the file of a capability map for the criterion, with the least share that
-    counts as near; confirm: a time of the criterion counts only where inverse kinematics with the base as it is reaches.
+    counts as near; confirm: a time of the criterion counts only where inverse kinematics with the moving base reaches.
     """
 
     window: Window = (15.0, 60.0)
