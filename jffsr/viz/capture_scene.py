@@ -75,9 +75,9 @@ def draw_capture(robot: Robot, geometry: Geometry, dataset: Dataset) -> Figure:
 
 def _few_numbers(panel, spans: np.ndarray) -> None:
     """Of a small picture: an axis has as many numbers as there is room for, the shortest hardly any."""
-    panel.set_box_aspect(spans, zoom=1.08)
+    panel.set_box_aspect(spans, zoom=1.03)
     for axis, share in zip((panel.xaxis, panel.yaxis, panel.zaxis), spans / spans.max(), strict=True):
-        axis.set_major_locator(MaxNLocator(max(1, round(3 * share - 0.6)), steps=[1, 2, 5, 10]))
+        axis.set_major_locator(MaxNLocator(max(1, round(3 * share - 1)), steps=[1, 2, 5, 10]))
         axis.set_tick_params(labelsize=6)
 
 
