@@ -32,8 +32,8 @@ class GraspCandidates:
 
     time (c,), s, best first, and criterion (c,), m, LOOKS_AWAY or more where the frame looks away, infinite where
     there is no such time; postures at each, best first: joint_position (c, s, n), base_position (c, s, 3), m,
-    base_quaternion (c, s, 4), error (c, s), m and rad added, by which the straight joint path misses the grasp
-    frame, and clearance (c, s), m, of all bodies there.
+    base_quaternion (c, s, 4), bow (c, s, n), by which the joint path is bent, error (c, s), m and rad added, by which
+    that path misses the grasp frame, and clearance (c, s), m, of all bodies there.
     """
 
     time: Array
@@ -41,6 +41,7 @@ class GraspCandidates:
     joint_position: Array
     base_position: Array
     base_quaternion: Array
+    bow: Array
     error: Array
     clearance: Array
 
@@ -58,6 +59,7 @@ class CandidateSettings:
     postures: int = 3
     iterations: int = 8
     num_steps: int = 16
+    largest_bow: float = 0.0
     seed: int = 1
 
 
@@ -99,6 +101,7 @@ def grasp_candidates(
         start,
         momentum=momentum,
         duration=None if momentum is None else jnp.mean(time),
+        largest_bow=settings.largest_bow,
         base_mode=base_mode,
         end_effector=end_effector,
         iterations=settings.iterations,
@@ -141,6 +144,7 @@ def _ranked(
 ) -> GraspCandidates:
     """The best postures of each time: those that reach it and are clear, near to the start; then the others."""
     away = jnp.linalg.norm(found.joint_position - jnp.asarray(initial_state.joint_position), axis=-1)
+    bow = jnp.zeros_like(found.joint_position) if found.bow is None else found.bow
     twice = _repeated(found.joint_position)
     cost = (
         away + 100 * jnp.maximum(error - 1e-3, 0) + 30 * jnp.maximum(0.02 - gap, 0) + jnp.where(twice, 1e3, 0)
@@ -154,7 +158,10 @@ def _ranked(
     return GraspCandidates(
         time,
         criterion,
-        *(chosen(x) for x in (found.joint_position, found.base_position, found.base_quaternion, error, gap)),
+        *(
+            chosen(x)
+            for x in (found.joint_position, found.base_position, found.base_quaternion, bow, error, gap)
+        ),
     )
 
 

@@ -28,7 +28,7 @@ from jffsr.clearance.model import ClearanceModel
 from jffsr.compiling import program
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.errors import InputError
-from jffsr.objectives.clearance import Clearance
+from jffsr.objectives.clearance import MISS, Clearance
 from jffsr.parallel.devices import all_devices
 from jffsr.parallel.mapping import spread
 from jffsr.planning.plan import check_precision
@@ -49,7 +49,8 @@ class CaptureSettings:
     """How captures are sought; lengths in m, times in s, angles in rad.
 
     candidates: times and postures to begin from; free_time: whether the grasp time may move within the window; margin
-    between all bodies; half_angle of the approach cone, None without one; deceleration, m/s^2, of the tool at the end
+    between all bodies, guard, more than which a plan keeps at its own samples so as to keep the margin between them;
+    half_angle of the approach cone, None without one; deceleration, m/s^2, of the tool at the end
     of a start; tolerance of the match, in m, rad, m/s and rad/s; num_steps and control_points of the motion; lanes,
     how many attempts run at once; most_steps of one attempt; step_factor of the re-run.
     """
@@ -57,6 +58,7 @@ class CaptureSettings:
     candidates: CandidateSettings = field(default_factory=CandidateSettings)
     free_time: bool = True
     margin: float = 0.02
+    guard: float = 0.003
     half_angle: float | None = HALF_ANGLE
     deceleration: float = 0.01
     tolerance: float = 1e-6
@@ -200,7 +202,12 @@ def _problem(
 ) -> Problem:
     clearance = None
     if task.clearance is not None:
-        keep = Clearance(task.clearance, np.asarray(settings.margin), windows=settings.windows)
+        keep = Clearance(
+            task.clearance,
+            np.asarray(settings.margin + settings.guard),
+            tolerance=np.asarray(settings.guard / MISS),
+            windows=settings.windows,
+        )
         clearance = TargetClearance(task.path, keep)
     return capture_problem(
         robot,
@@ -228,7 +235,7 @@ def _starts(
         return np.reshape(x, (len(problems), *x.shape[2:]))
 
     deceleration = np.full(candidates.error.shape[2], settings.deceleration)
-    postures = candidates.joint_position, candidates.base_position, candidates.base_quaternion
+    postures = candidates.joint_position, candidates.base_position, candidates.base_quaternion, candidates.bow
     with all_devices():
         found = capture_starts(
             stacked(problems), stacked(paths), *map(flat, postures), deceleration, end_effector

@@ -2,7 +2,8 @@
 
 Of a B-spline's free control points the last three are set so that at the posture the tool moves with the grasp frame
 and decelerates against its x axis: with the relative velocity zero at contact, the way the tool came is the direction
-of that deceleration. The other points lie straight on the way from the start.
+of that deceleration. The other points lie straight on the way from the start; where that way is bent, they are moved so
+that the curve comes nearest to the bow.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.compiling import program
@@ -21,20 +23,23 @@ from jffsr.planning.problem import Problem
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_multiply, quaternion_to_matrix
 from jffsr.target.grasp_frames import fixed_acceleration
-from jffsr.trajectories.bspline import ClampedBSpline
+from jffsr.trajectories.bspline import ClampedBSpline, basis
 from jffsr.types import Array, Quaternion, Scalar, Twist, Vector, Vector3
+
+_FIT_SAMPLES = 33
 
 _DAMPING = 1e-6
 """Added to the squares of the generalized Jacobian, m^2 and rad^2: near a singularity rates stay finite."""
 
 
-@program(static_argnums=(6,))
+@program(static_argnums=(7,))
 def capture_starts(
     problems: Problem,
     paths: GraspPath,
     joint_position: Array,
     base_position: Array,
     base_quaternion: Array,
+    bow: Array,
     deceleration: Array,
     end_effector: str | None,
 ) -> Array:
@@ -42,7 +47,8 @@ def capture_starts(
 
     problems and paths with a leading axis (K,) on every array, their trajectories clamped B-splines with a free end
     and at least three free control points; joint_position (K, s, n), base_position (K, s, 3), m, and base_quaternion
-    (K, s, 4) at the grasp; deceleration (s,), m/s^2, of the tool relative to the grasp frame.
+    (K, s, 4) at the grasp, bow (K, s, n) of the way there (`inverse_kinematics_floating`); deceleration (s,), m/s^2, of
+    the tool relative to the grasp frame.
     """
 
     def one(item) -> Array:
@@ -50,7 +56,7 @@ def capture_starts(
         of_one = partial(_start, problem, path, end_effector=end_effector)
         return jax.vmap(of_one)(*postures, deceleration)
 
-    return spread(one, (problems, paths, joint_position, base_position, base_quaternion))
+    return spread(one, (problems, paths, joint_position, base_position, base_quaternion, bow))
 
 
 def _start(
@@ -59,6 +65,7 @@ def _start(
     q: Vector,
     place: Vector3,
     turn: Quaternion,
+    bow: Vector,
     deceleration: Scalar,
     end_effector: str | None,
 ) -> Vector:
@@ -70,7 +77,7 @@ def _start(
     slowing = jnp.zeros(6).at[:3].set(deceleration * quaternion_to_matrix(quaternion)[:, 0])
     acceleration = fixed_acceleration(path.motion.target.inertia, target, path.position_T) - slowing
     rate, second = rates_at(problem, state, twist, acceleration, end_effector)
-    inner = ending_so(law, q, rate, second)
+    inner = bent(law, ending_so(law, q, rate, second), bow)
     free = jnp.clip(inner, law.lower, law.upper).ravel()
     return free if law.duration_bounds is None else jnp.append(free, duration)
 
@@ -117,3 +124,14 @@ def ending_so(law: ClampedBSpline, position: Vector, rate: Vector, acceleration:
     share = jnp.arange(1, others + 1)[:, None] / (others + 1)
     way = law.start + share * (third - law.start)
     return jnp.concatenate([way, jnp.stack([third, before, last])])
+
+
+def bent(law: ClampedBSpline, inner: Array, bow: Vector) -> Array:
+    """Inner control points (f, n), f >= 3, of which all but the last three are moved: by least squares over the way the
+    curve is moved by the bow 64 s^3 (1 - s)^3 bow, bow (n,), in rad or m."""
+    others = law.inner.shape[0] - 3
+    share = np.linspace(0.0, 1.0, _FIT_SAMPLES)
+    fixed = law.control_points.shape[0] - law.inner.shape[0]
+    moved = basis(law.knots, law.degree, share)[-1][fixed : fixed + others]
+    factor = np.linalg.lstsq(moved.T, 64 * share**3 * (1 - share) ** 3, rcond=None)[0]
+    return inner + np.append(factor, np.zeros(3))[:, None] * bow

@@ -13,8 +13,9 @@ from jffsr.capture.approach import ApproachCone, approach_velocity
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.match import GraspMatch
 from jffsr.capture.problem import capture_problem
-from jffsr.capture.starts import ending_so, rates_at
+from jffsr.capture.starts import bent, capture_starts, ending_so, rates_at
 from jffsr.capture.tool_motion import tool_samples
+from jffsr.robots.stacking import stacked
 from jffsr.rollouts.rollout import rollout
 from jffsr.spatial.rotation import quaternion_to_matrix, rotation_vector_to_quaternion
 from jffsr.target.body import Target
@@ -116,6 +117,45 @@ def test_a_spline_ends_as_it_is_told(problem):
         np.testing.assert_allclose(found, asked, atol=1e-12)
     for found, asked in zip(law(0.0), (START, np.zeros(7), np.zeros(7)), strict=True):
         np.testing.assert_allclose(found, asked, atol=1e-12)
+
+
+def test_a_bent_way_comes_near_to_its_bow_and_ends_as_before(problem):
+    state, bow = problem.initial_state, np.linspace(-0.2, 0.3, 7)
+    many = capture_problem(problem.robot, problem.constraints[0].path, state, DURATION, control_points=14)
+    for case, near in ((problem, 0.4), (many, 0.05)):
+        law, rng = case.trajectory, np.random.default_rng(1)
+        inner = rng.uniform(-0.5, 0.5, law.inner.shape)
+        before, after = (law.with_free(np.ravel(x)) for x in (inner, bent(law, inner, bow)))
+        share = np.linspace(0, 1, 41)
+        moved = after.on_grid(share * DURATION)[0] - before.on_grid(share * DURATION)[0]
+        asked = bow[:, None] * 64 * share**3 * (1 - share) ** 3
+        assert np.max(np.abs(moved - asked)) < near * np.max(np.abs(bow))
+        for found, same in zip(after(DURATION), before(DURATION), strict=True):
+            np.testing.assert_allclose(found, same, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_a_start_comes_to_a_still_target_along_its_axis(problem):
+    """Relative velocity just before contact points along the frame's x axis, and not against it."""
+    target = Target.create((1.0, 1.0, 1.0), grasps={"handle": ((-0.4, 0.0, 0.0), (0.8, 0.0, 0.6, 0.0))})
+    still = TargetState.create((2.0, 0.0, -1.5), np.zeros(3), (0.96, 0.28, 0.0, 0.0), np.zeros(3))
+    path = GraspPath.create(target_motion(target, still, 40.0, 24))
+    state = jffsr.State(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), START)
+    case = capture_problem(problem.robot, path, state, DURATION, num_steps=NUM_STEPS)
+    posture = np.deg2rad([10.0, -30.0, 20.0, 30.0, 15.0, -40.0, 5.0])
+    base = (state.base_position, state.base_quaternion)
+    # Where the base is in the end follows from the way there: twice is near enough.
+    for _ in range(2):
+        given = (posture, *base, np.zeros(7))
+        start = capture_starts(
+            stacked([case]), stacked([path]), *(x[None, None] for x in given), np.array([0.01]), None
+        )[0, 0]
+        motion = jax.device_get(jax.jit(case.motion)(start))
+        base = (motion.base_position[-1], motion.base_quaternion[-1])
+    tool = tool_samples(case.robot, motion, None, [NUM_STEPS - 8])[0]
+    along, length = approach_velocity(path, tool.time, DURATION, tool.position, tool.twist[:3])
+    assert 0.5 < along / (0.01 * 8 * DURATION / NUM_STEPS) < 2
+    assert along > 0.9 * length
 
 
 def test_rates_at_the_grasp_move_the_tool_as_asked(problem):
