@@ -32,8 +32,8 @@ class ObservedTarget:
     """What the robot knows when it starts: the last estimate, `age` s old, and the motion predicted from it.
 
     target has its shapes in `geometry` and its axes are the marker's; motion begins at the estimate, so that the
-    robot starts at its time `age`; poses, how many were seen, used, in which the filter believed; lost, whether it has
-    lost the track; tolerances of the prediction.
+    robot starts at its time `age`; poses, how many exposures, seen, how many gave one, and filtered, after
+    the acquisition; used, in how many of these the filter believed; lost, whether it has lost the track; tolerances of the prediction.
     """
 
     estimate: TargetEstimate
@@ -43,6 +43,7 @@ class ObservedTarget:
     age: float
     poses: int
     seen: int
+    filtered: int
     used: int
     lost: bool
     tolerances: ConvergenceTolerances
@@ -84,6 +85,7 @@ def observe(study: CaptureStudy, section: Observation, last: float) -> ObservedT
         age,
         count,
         int(np.sum(measurements.seen)),
+        int(np.sum(measurements.seen[section.acquisition :])),
         int(np.sum(course.used)),
         bool(course.lost[-1]),
         ConvergenceTolerances(

@@ -67,7 +67,7 @@ def plan_study(
     if config.observation is not None:
         observed = observe(study, config.observation, float(study.motion.duration))
         motion, geometry, age = observed.motion, observed.geometry, observed.age
-        say(f"observed {observed.poses} poses, {observed.used} used")
+        say(f"observed {observed.seen} poses")
     first, last = config.grasp_time.window
     chosen = grasp_time(
         study.robot,

@@ -101,6 +101,7 @@ def _observation(found: PlannedCapture) -> dict[str, Any]:
     told: dict[str, Any] = {
         "poses": observed.poses,
         "seen": observed.seen,
+        "filtered": observed.filtered,
         "used": observed.used,
         "lost": observed.lost,
     }
@@ -166,7 +167,8 @@ def summary_text(summary: dict[str, Any]) -> str:
 def _observation_lines(observed: dict[str, Any] | None) -> list[str]:
     if observed is None:
         return []
-    lines = [f"  observed      {observed['poses']} poses, {observed['used']} of them used"]
+    filtered = f"{observed['used']} of the {observed['filtered']} after the acquisition used"
+    lines = [f"  observed      {observed['seen']} poses in {observed['poses']} exposures, {filtered}"]
     if "predicted_deviation" in observed:
         lines += [
             f"  predicted     within {_sizes(observed['predicted_deviation'])} (root mean square)",
