@@ -1,8 +1,7 @@
-"""One capture: checked, sought until its constraints are kept, then made better level by level.
+"""One capture: checked, sought until its constraints are kept, then made better.
 
-To be made better, an index is one more constraint: at most some level. Several levels below the one that is kept are
-tried side by side, from the free numbers that keep it; the lowest that can be restored is kept, and the next ones lie
-between it and the next lower, which could not.
+What is better moves more, and comes nearer to other bodies, than what was found first: so it is sought on a finer grid,
+in several lanes that differ in how far inside the limits they stay, and the best that the re-run confirms is taken.
 """
 
 from __future__ import annotations
@@ -13,18 +12,19 @@ from dataclasses import dataclass, replace
 import jax
 import numpy as np
 
-from jffsr.capture.batch import restore_many
 from jffsr.capture.captures import CaptureSettings, CaptureTask, plan_captures, reviewed
 from jffsr.capture.checks import check_capture
 from jffsr.capture.grasp_path import GraspPath
+from jffsr.capture.improve import improve_many
 from jffsr.capture.match import grasp_error
 from jffsr.capture.outcome import CaptureCode, CaptureResult, explain_capture
-from jffsr.capture.terms import BaseDisturbance, IndexAtMost
+from jffsr.capture.terms import BaseDisturbance
 from jffsr.clearance.model import ClearanceModel
 from jffsr.compiling import program
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.objectives.terms import Term
+from jffsr.optimizers.sequential_quadratic import SequentialQuadratic
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import ResultCode
 from jffsr.planning.verification import Verification
@@ -35,8 +35,14 @@ from jffsr.rollouts.motion import Motion
 from jffsr.target.prediction import GraspPrediction
 from jffsr.types import Array
 
-LEVELS = 8
-"""Tried side by side."""
+INSIDE = (1e-3, 0.03, 0.1, 0.2)
+"""How far inside their limits the inequalities are driven, each in a lane of its own; 0.1 is 1 cm of clearance."""
+
+ROUND = 40
+"""Trials of each lane in a round."""
+
+FINER = 2
+"""Steps of the rollout on which a plan is made better, times those on which it was found."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +91,11 @@ def plan_capture(
 ) -> CapturePlan:
     """Plan the capture of a grasp frame by a robot at rest of its joints.
 
-    A plan that keeps every constraint is sought from several grasp times and postures; `improve` rounds of levels then
-    make the sum of `terms` small (the base's disturbance by default), and a better plan is taken only where the re-run
-    says that it keeps the constraints too. geometry of the target and the prediction behind its motion are looked at
-    beforehand. Raises InputError as `plan_captures`; what cannot be done is told by the result's code.
+    A plan that keeps every constraint is sought from several grasp times and postures; `improve` rounds of sequential
+    quadratic programming then make the sum of `terms` small (the base's disturbance by default), and a better plan is
+    taken only where the re-run says that it keeps the constraints too. geometry of the target and the prediction behind
+    its motion are looked at beforehand. Raises InputError as `plan_captures`; what cannot be done is told by the
+    result's code.
     """
     wrong = check_capture(robot, path, initial_state, clearance, geometry, prediction)
     if wrong is not None:
@@ -107,53 +114,40 @@ def plan_capture(
     if not found.attempts[0]:
         return CapturePlan(result)
     objective = CompositeIndex(
-        tuple(terms) if terms else (BaseDisturbance(np.asarray(1.0)),), accuracy=np.inf
+        tuple(terms) if terms else (BaseDisturbance(np.asarray(1.0)),), accuracy=np.asarray(np.inf)
     )
-    problem, free = replace(found.problems[0], objective=objective), found.free[0]
-    plan = _told(problem, free, result, settings, end_effector)
+    problem = replace(found.problems[0], objective=objective)
+    (plan,) = verified_plans([problem], found.free[:1], settings, end_effector)
+    plan = replace(plan, result=result)
     if not result.success or not improve:
         return plan
+    finer = replace(problem, num_steps=FINER * problem.num_steps)
+    methods = [SequentialQuadratic(steps=float(ROUND), inside=inside) for inside in INSIDE]
     best = plan
-    low, high = min(0.0, 2 * plan.cost), plan.cost
     for _ in range(improve):
-        levels = np.linspace(low, high, LEVELS + 2)[1:-1]
-        if high <= low:
+        better = improve_many([finer] * len(INSIDE), np.tile(best.free, (len(INSIDE), 1)), methods)
+        tried = verified_plans([finer] * len(INSIDE), better.free, settings, end_effector)
+        tried = [one for one in tried if one.result.success and one.cost < best.cost]
+        if not tried:
             break
-        limited = [_at_most(problem, level) for level in levels]
-        starts = np.broadcast_to(best.free, (LEVELS, 1, len(free)))
-        found = restore_many(limited, starts, lanes=LEVELS, most_steps=settings.most_steps)
-        kept = np.flatnonzero(found.kept)
-        low = levels[kept[0] - 1] if len(kept) and kept[0] else low if len(kept) else levels[-1]
-        for number in kept:
-            better = _told(problem, found.free[number], None, settings, end_effector)
-            if better.result.success and better.cost < best.cost:
-                best, high = better, better.cost
-                break
+        best = min(tried, key=lambda one: one.cost)
     return replace(best, before=plan.cost)
 
 
-def _at_most(problem: Problem, level: float) -> Problem:
-    limit = IndexAtMost(problem.objective, np.asarray(level))
-    return replace(problem, constraints=(*problem.constraints, limit))
-
-
-def _told(
-    problem: Problem,
-    free: np.ndarray,
-    result: CaptureResult | None,
-    settings: CaptureSettings,
-    end_effector: str | None,
-) -> CapturePlan:
-    """The plan of these free numbers, verified."""
-    motion, verification, verdict = jax.tree.map(
-        lambda x: x[0], reviewed([problem], free[None], settings.step_factor)
-    )
-    if result is None:
-        kept = verdict == ResultCode.ACCURACY_MET
+def verified_plans(
+    problems: Sequence[Problem], free: np.ndarray, settings: CaptureSettings, end_effector: str | None = None
+) -> list[CapturePlan]:
+    """The plans of these free numbers (K, k), one of each problem, with what the re-run says of them."""
+    motions, verifications, verdicts = reviewed(problems, free, settings.step_factor)
+    plans = []
+    for k, problem in enumerate(problems):
+        motion, verification = jax.tree.map(lambda x, k=k: x[k], (motions, verifications))
+        kept = verdicts[k] == ResultCode.ACCURACY_MET
         code = CaptureCode.CAPTURED if kept else CaptureCode.NOT_VERIFIED
         result = explain_capture(code, problem, verification)
-    terms, error = jax.device_get(_terms_and_error(problem, free, end_effector))
-    return CapturePlan(result, problem, free, motion, verification, terms, error)
+        terms, error = jax.device_get(_terms_and_error(problem, free[k], end_effector))
+        plans.append(CapturePlan(result, problem, free[k], motion, verification, terms, error))
+    return plans
 
 
 @program(static_argnums=2)

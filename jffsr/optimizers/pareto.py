@@ -127,7 +127,7 @@ def pareto_set(
     if polish_iterations < 0:
         raise InputError(f"polish_iterations is {polish_iterations}; 0 or more are expected")
     positions, values, spent = _evolved(problem, evaluations, population, seed)
-    kept = _not_dominated(values)
+    kept = not_dominated(values)
     positions, values = positions[kept], values[kept]
     corner = _reference(values, reference)
     before, gradients = _hypervolume(values, corner), 0
@@ -138,7 +138,7 @@ def pareto_set(
                 polished(problem, positions, values, key, polish_iterations)
             )
         gradients = int(np.sum(used))
-        kept = _not_dominated(values)
+        kept = not_dominated(values)
         positions, values = positions[kept], values[kept]
     order = np.lexsort(values.T[::-1])
     positions, values = positions[order], values[order]
@@ -203,8 +203,8 @@ def _library():
     return start, tell
 
 
-def _not_dominated(values: np.ndarray) -> np.ndarray:
-    """Which members (K,) are finite, not dominated, and the first of their equals."""
+def not_dominated(values: np.ndarray) -> np.ndarray:
+    """Numbers of those of values (K, m), all to be made small, that are finite, not dominated, and no later equals."""
     finite = np.all(values < _WORST, axis=1)
     one, other = values[:, None], values[None]
     beaten = np.all(other <= one, axis=2) & np.any(other < one, axis=2)
