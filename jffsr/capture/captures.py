@@ -202,15 +202,7 @@ def _problem(
     momentum: Array | None,
     base_mode: str,
 ) -> Problem:
-    clearance = None
-    if task.clearance is not None:
-        keep = Clearance(
-            task.clearance,
-            np.asarray(settings.margin + settings.guard),
-            tolerance=np.asarray(settings.guard / MISS),
-            windows=settings.windows,
-        )
-        clearance = TargetClearance(task.path, keep)
+    clearance = None if task.clearance is None else keeping_clear(task.path, task.clearance, settings)
     return capture_problem(
         robot,
         task.path,
@@ -226,6 +218,17 @@ def _problem(
         momentum=momentum,
         base_mode=base_mode,
     )
+
+
+def keeping_clear(path: GraspPath, model: ClearanceModel, settings: CaptureSettings) -> TargetClearance:
+    """The constraint that margin and guard be kept at the samples, and the margin on the re-run."""
+    keep = Clearance(
+        model,
+        np.asarray(settings.margin + settings.guard),
+        tolerance=np.asarray(settings.guard / MISS),
+        windows=settings.windows,
+    )
+    return TargetClearance(path, keep)
 
 
 def _starts(

@@ -15,7 +15,7 @@ from jffsr.capture.capability_map import CapabilityMap
 from jffsr.capture.capability_map_file import load_capability_map
 from jffsr.capture.captures import CaptureSettings
 from jffsr.capture.grasp_path import GraspPath
-from jffsr.capture.terms import BaseDisturbance, LostManipulability
+from jffsr.capture.terms import BaseDisturbance, ExecutionTime, LostManipulability
 from jffsr.clearance.model import ClearanceModel
 from jffsr.errors import InputError
 from jffsr.objectives.terms import Term
@@ -136,12 +136,14 @@ def build_settings(config: CaptureConfig, time: float | None) -> CaptureSettings
         apart=wanted.apart,
         starts=wanted.starts,
         postures=wanted.postures,
+        largest_bow=wanted.largest_bow,
         seed=config.seed,
     )
     return CaptureSettings(
         candidates=candidates,
         free_time=time is None,
         margin=0.0 if wanted.margin is None else wanted.margin,
+        guard=wanted.guard,
         half_angle=wanted.si("cone_half_angle") if wanted.cone else None,
         deceleration=wanted.deceleration,
         tolerance=wanted.tolerance,
@@ -179,8 +181,10 @@ def build_indices(config: CaptureConfig, study: CaptureStudy, path: GraspPath) -
 
 def build_terms(config: CaptureConfig, study: CaptureStudy, path: GraspPath) -> tuple[Term, ...]:
     """The terms that count."""
-    wanted = (config.objective.base_disturbance, config.objective.lost_manipulability)
-    pairs = zip(build_indices(config, study, path), wanted, strict=True)
+    wanted = config.objective
+    soon = ExecutionTime(np.asarray(wanted.execution_time.scale))
+    sections = (wanted.base_disturbance, wanted.lost_manipulability, wanted.execution_time)
+    pairs = zip((*build_indices(config, study, path), soon), sections, strict=True)
     return tuple(term for term, section in pairs if section.enabled)
 
 

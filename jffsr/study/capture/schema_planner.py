@@ -64,6 +64,7 @@ class Planner(Section):
     units: ClassVar = ("cone_half_angle",)
 
     margin: NotNegative | None = 0.02  # between all bodies; null: they may pass through each other
+    guard: NotNegative = 0.003  # kept in addition at the planner's samples, for what lies between them
     ignore: Annotated[
         tuple[Annotated[tuple[str, ...], sequence("a pair of body names", 2, 2)], ...],
         sequence("a list of pairs of bodies", 0, 1000),
@@ -76,7 +77,8 @@ class Planner(Section):
     num_steps: Annotated[int, whole(10, 10_000)] = 50
     times: Annotated[int, whole(1, 50)] = 4  # of the criterion, to begin from where the time is free
     apart: Seconds = 4.0  # of these times from each other
-    starts: Annotated[int, whole(1, 200)] = 6  # of inverse kinematics at each time
+    starts: Annotated[int, whole(1, 1000)] = 6  # of inverse kinematics at each time
+    largest_bow: NotNegative = 0.0  # rad or m, of the joints' ways to these postures; 0: straight
     postures: Annotated[int, whole(1, 50)] = 3  # of those found that are tried, nearest first
     deceleration: Positive = 0.01  # m/s^2 of the tool at the end of a start
     lanes: Annotated[int, whole(1, 1000)] = 16  # attempts at once
@@ -130,15 +132,23 @@ class LostManipulability(Section):
         return self
 
 
+class ExecutionTime(Section):
+    """How long the motion lasts, s, for a time that is free."""
+
+    enabled: Flag = False
+    scale: Positive = 1.0
+
+
 class Objective(Section):
     """What is made small once every constraint is kept: the sum of the terms that are enabled."""
 
     base_disturbance: BaseDisturbance = BaseDisturbance()
     lost_manipulability: LostManipulability = LostManipulability()
+    execution_time: ExecutionTime = ExecutionTime()
 
     @model_validator(mode="after")
     def _check(self) -> Objective:
-        if not (self.base_disturbance.enabled or self.lost_manipulability.enabled):
+        if not any(getattr(self, name).enabled for name in type(self).model_fields):
             raise conflict("no term is enabled, at least one is expected")
         return self
 
