@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -12,19 +11,14 @@ from jffsr.capture.problem import NUM_STEPS
 from jffsr.errors import InputError
 from jffsr.study.capture import schema_planner
 from jffsr.study.capture.building import build_settings, build_study, build_terms
-from jffsr.study.capture.observing import estimated_target, moved_geometry, state_before
 from jffsr.study.config import dump_config, load_config
 from jffsr.study.planning import plan
 from jffsr.study.sweep.points import expand
 from jffsr.study.sweep.specification import read_sweep
-from jffsr.target.body import Target
 from jffsr.target.camera import Camera
-from jffsr.target.estimate import true_estimate
 from jffsr.target.grasp_frames import grasp_frame
 from jffsr.target.prediction import ConvergenceTolerances
 from jffsr.target.prior import TargetPrior
-from jffsr.target.target_state import TargetState
-from jffsr.target.tumbling import target_motion
 
 CONFIG = "tumbling_box"
 
@@ -169,42 +163,3 @@ def test_other_commands_say_what_they_are_for():
         plan(CONFIG)
     with pytest.raises(InputError, match="only planning studies are swept over"):
         expand(read_sweep(CONFIG, ["seed=1,2"]))
-
-
-def test_the_state_before_leads_to_the_state():
-    target = Target.create((10.0, 13.0, 15.0))
-    state = TargetState.create((1, 2, 3), (0.01, 0.0, -0.02), (0.5, 0.5, -0.5, 0.5), (0.1, 0.05, -0.08))
-    past = state_before(target, state, 40.0)
-    again = target_motion(target, past, 40.0)(40.0)
-    jax.tree.map(lambda x, y: np.testing.assert_allclose(x, y, atol=1e-12), again, state)
-    np.testing.assert_allclose(past.position, [0.6, 2.0, 3.8], atol=1e-12)
-
-
-def test_an_estimate_that_is_the_truth_puts_frames_and_shapes_where_they_are():
-    study = build_study(
-        load_config(
-            CONFIG,
-            [
-                "target.marker={position: [-0.1, 0.05, 0.03], rotation_vector_deg: [20, -50, 70]}",
-                "target.grasps.handle.rotation_vector_deg=[0, 30, 0]",
-                "target.shapes.0.rpy_deg=[10, 20, 30]",
-                "target.shapes.0.position=[0.02, 0.01, 0]",
-            ],
-        )
-    )
-    estimate = true_estimate(study.target, study.target_state)
-    target = estimated_target(study.target, estimate)
-    seen, true = grasp_frame(target, estimate.state), grasp_frame(study.target, study.target_state)
-    np.testing.assert_allclose(seen[0], true[0], atol=1e-12)
-    np.testing.assert_allclose(abs(np.dot(seen[1], true[1])), 1.0, atol=1e-12)
-    np.testing.assert_allclose(seen[2], true[2], atol=1e-12)
-    # A corner of the box, by way of either frame.
-    (moved,), (shape,) = moved_geometry(study, target).shapes, study.geometry.shapes
-    corners = [
-        Rotation.from_quat(np.asarray(state.quaternion), scalar_first=True).apply(
-            s.rotation @ s.size + s.position
-        )
-        + state.position
-        for s, state in ((moved, estimate.state), (shape, study.target_state))
-    ]
-    np.testing.assert_allclose(*corners, atol=1e-12)

@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.compiling import program
 from jffsr.robots.geometry import Geometry
-from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.study.capture.building import CaptureStudy, moving
 from jffsr.study.capture.schema_observation import Observation
 from jffsr.target.body import Target
 from jffsr.target.camera import Camera, Measurements, observe_target, sample_times
 from jffsr.target.estimate import TargetEstimate
+from jffsr.target.estimated import estimated_geometry, estimated_target
 from jffsr.target.filter import FilteredTarget, FilterSettings, filter_target
-from jffsr.target.inertia_parameters import inertia_from_parameters
 from jffsr.target.prediction import ConvergenceTolerances, GraspPrediction, has_converged, predict_grasp
 from jffsr.target.prior import TargetPrior
-from jffsr.target.target_state import TargetState
-from jffsr.target.tumbling import TargetMotion, target_motion
-
-_UNIT = np.array([1.0, 0.0, 0.0, 0.0])
+from jffsr.target.tumbling import TargetMotion, state_before, target_motion
 
 
 @dataclass(frozen=True)
 class ObservedTarget:
     """What the robot knows when it starts: the last estimate, `age` s old, and the motion predicted from it.
 
-    target has its shapes in `geometry` and its axes are the marker's; motion begins at the estimate, so that the
-    robot starts at its time `age`; poses, how many exposures, seen, how many gave one, and filtered, after
-    the acquisition; used, in how many of these the filter believed; lost, whether it has lost the track; tolerances of the prediction.
+    target has its shapes in `geometry` and its axes are the marker's; motion begins at the estimate, so that the robot
+    starts at its time `age`; exposures, of which `seen` gave a pose; of those after the acquisition (`filtered`) the
+    filter believed in `used`; lost, whether it has lost the track; tolerances of the prediction.
     """
 
     estimate: TargetEstimate
@@ -41,7 +36,7 @@ class ObservedTarget:
     geometry: Geometry
     motion: TargetMotion
     age: float
-    poses: int
+    exposures: int
     seen: int
     filtered: int
     used: int
@@ -80,7 +75,7 @@ def observe(study: CaptureStudy, section: Observation, last: float) -> ObservedT
     return ObservedTarget(
         estimate,
         target,
-        moved_geometry(study, target),
+        estimated_geometry(study.target, study.geometry, estimate),
         moving(target, estimate.state, age + last),
         age,
         count,
@@ -105,44 +100,6 @@ def _filtered(
     return filter_target(measurements, camera, prior, settings)
 
 
-def state_before(target: Target, state: TargetState, seconds: float) -> TargetState:
-    """Where the free target was that many seconds before the state: its motion with all velocities turned round."""
-    back = replace(state, velocity=-np.asarray(state.velocity), angular_velocity_T=-state.angular_velocity_T)
-    then = target_motion(target, back, seconds)(seconds)
-    return replace(then, velocity=-then.velocity, angular_velocity_T=-then.angular_velocity_T)
-
-
-def estimated_target(true_target: Target, estimate: TargetEstimate) -> Target:
-    """The target in the estimate's frame: origin in the estimated centre of mass, axes of the marker.
-
-    Its grasp frames are where the marker, whose place on the target is known, says.
-    """
-    offset = estimate.marker_offset_T
-    frames = {name: true_target.grasp_in_marker(name) for name in true_target.grasp_names}
-    return Target.create(
-        np.asarray(inertia_from_parameters(estimate.inertia_parameters)),
-        true_target.mass,
-        (offset, _UNIT),
-        {name: (offset + np.asarray(p), np.asarray(q)) for name, (p, q) in frames.items()},
-    )
-
-
-def moved_geometry(study: CaptureStudy, target: Target) -> Geometry:
-    """The true target's shapes in the frame of an estimated one, by way of the marker."""
-    true = study.target
-    back = np.asarray(quaternion_to_matrix(jnp.asarray(true.marker_quaternion))).T
-    return Geometry(
-        tuple(
-            replace(
-                shape,
-                position=back @ (shape.position - true.marker_position) + np.asarray(target.marker_position),
-                rotation=back @ shape.rotation,
-            )
-            for shape in study.geometry.shapes
-        )
-    )
-
-
 def _camera(section: Observation) -> Camera:
     wanted = section.camera
     camera = Camera(
@@ -160,6 +117,7 @@ def _camera(section: Observation) -> Camera:
 def _prior(section: Observation) -> TargetPrior:
     wanted = section.prior
     return TargetPrior.create(
+        inertia=np.array(wanted.inertia),
         angular_velocity_deviation=wanted.si("angular_velocity_deviation"),
         inertia_deviation=wanted.inertia_deviation,
         velocity_deviation=wanted.velocity_deviation,

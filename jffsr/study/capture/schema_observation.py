@@ -8,6 +8,7 @@ from pydantic import model_validator
 
 from jffsr.reading.section import Section
 from jffsr.reading.values import conflict, flag, number, whole
+from jffsr.study.capture.schema_target import Inertia
 
 Positive = Annotated[float, number(gt=0)]
 NotNegative = Annotated[float, number(ge=0)]
@@ -48,12 +49,16 @@ class Camera(Section):
 
 
 class Prior(Section):
-    """Standard deviations of what is believed before any pose: of the rate, the inertia, the drift and the offset."""
+    """What is believed before any pose: inertia, in any unit, in the marker's axes, and neither rate, drift nor offset.
+
+    Standard deviations of each; a truth many of them away makes the filter too sure of itself.
+    """
 
     units: ClassVar = ("angular_velocity_deviation",)
 
     angular_velocity_deviation_deg: Positive | None = None
     angular_velocity_deviation: Positive | None = None
+    inertia: Inertia = (1.0, 1.0, 1.0)
     inertia_deviation: Positive = 0.05  # of the five numbers of the ratios
     velocity_deviation: Positive = 0.05  # m/s
     offset_deviation: Positive = 0.05  # m

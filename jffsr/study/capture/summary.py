@@ -99,7 +99,7 @@ def _verification(plan: CapturePlan) -> dict[str, Any]:
 def _observation(found: PlannedCapture) -> dict[str, Any]:
     observed, prediction = found.observed, found.prediction
     told: dict[str, Any] = {
-        "poses": observed.poses,
+        "exposures": observed.exposures,
         "seen": observed.seen,
         "filtered": observed.filtered,
         "used": observed.used,
@@ -168,7 +168,7 @@ def _observation_lines(observed: dict[str, Any] | None) -> list[str]:
     if observed is None:
         return []
     filtered = f"{observed['used']} of the {observed['filtered']} after the acquisition used"
-    lines = [f"  observed      {observed['seen']} poses in {observed['poses']} exposures, {filtered}"]
+    lines = [f"  observed      {observed['seen']} poses in {observed['exposures']} exposures, {filtered}"]
     if "predicted_deviation" in observed:
         lines += [
             f"  predicted     within {_sizes(observed['predicted_deviation'])} (root mean square)",
