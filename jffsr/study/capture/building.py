@@ -22,8 +22,9 @@ from jffsr.objectives.terms import Term
 from jffsr.robots.checks import check_shape
 from jffsr.robots.geometry import COLLISION, VISUAL, Geometry, Shape
 from jffsr.robots.robot import Robot
+from jffsr.robots.shape_schema import ShapeModel
 from jffsr.robots.state import State
-from jffsr.robots.yaml_schema import ShapeModel, rpy_deg_to_matrix
+from jffsr.robots.yaml_schema import rpy_deg_to_matrix
 from jffsr.study.building import build_robot
 from jffsr.study.capture.schema import CaptureConfig
 from jffsr.study.capture.schema_planner import CRITERION, FREE

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from jffsr.reading.section import Section
 from jffsr.reading.values import conflict, either, number, sequence, text
-from jffsr.robots.yaml_schema import ShapeModel
+from jffsr.robots.shape_schema import ShapeModel
 from jffsr.study.schema_task import Number, Vector3
 
 Positive = Annotated[float, number(gt=0)]
