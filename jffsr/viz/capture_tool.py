@@ -68,9 +68,8 @@ def _draw_errors(panels, dataset: Dataset) -> None:
             )
             if "true_grasp_error" in dataset:
                 true = {**look, "linestyle": (0, (1, 1)), "linewidth": 1.4}
-                panel.semilogy(
-                    time, _lengths(dataset, "true_grasp_error", first), **true, label=f"{name}, true"
-                )
+                label = _named(f"{name}, true", dataset, "true_grasp_error", first)
+                panel.semilogy(time, _lengths(dataset, "true_grasp_error", first), **true, label=label)
         panel.set_ylabel(title)
         panel.yaxis.set_major_locator(LogLocator(numticks=5))
         panel.yaxis.set_minor_formatter(NullFormatter())
