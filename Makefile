@@ -51,7 +51,7 @@ check-physics: $(STAMP)  ## check 1,000 random robots against MuJoCo and the law
 	$(PYTEST) -m physics $(PYTEST_ARGS)
 
 check-capture: $(STAMP)  ## run the heavier checks of target, clearance and capture, and plan 100 random captures
-	$(PYTEST) -m slow tests/target tests/clearance tests/capture $(PYTEST_ARGS)
+	$(PYTEST) -m slow tests/target tests/clearance tests/capture tests/study/test_capture_runs.py $(PYTEST_ARGS)
 	$(VENV_PYTHON) -m experiments.captures --count 100 --folder runs/captures-check --check
 
 captures: $(STAMP)  ## plan a thousand random captures twice (goes on where it was stopped)
