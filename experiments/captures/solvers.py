@@ -1,7 +1,7 @@
 """The published solver, swarm then gradients, and this package's planner on the same captures.
 
-Run it from the root of the repository: `python -m experiments.captures.solvers`. What was solved is kept line by line in
-runs/capture_solvers, and the same command goes on where it was stopped.
+Run it from the root of the repository: `python -m experiments.captures.solvers`. What was solved is kept line by line
+in runs/capture_solvers, and the same command goes on where it was stopped.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@ Wang, Luo and Yu 2021, section 3.3: a swarm with adaptive inertia lowers Gamma_1
 inequality are repaired; feasible ones are stored, and from these a choice is made by the base's disturbance, eq. (26),
 and manipulability, eq. (27). What the paper leaves open was chosen so: the inertia follows the share of particles that
 bettered themselves (`PSO`'s rule `success`); a candidate beyond a limit of rate or acceleration is repaired by drawing
-that joint's control points towards its start until the limit is kept, which is exact, as a spline is linear in them, and
-one beyond a position limit is cut there; approach cone and clearance, for which the paper names no repair, are looked at
-when the archive is verified. The grasp time is given.
+that joint's control points towards its start until the limit is kept, which is exact, as a spline is linear in them,
+and one beyond a position limit is cut there; approach cone and clearance, for which the paper names no repair, are
+looked at when the archive is verified. The grasp time is given.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def test_the_tool_is_at_the_handle_in_each(front):
         yaw = 2 * np.arctan2(end.base_quaternion[-1, 3], end.base_quaternion[-1, 0])
         angles = yaw + np.cumsum(end.joint_position[-1])
         tip = end.base_position[-1, :2] + 0.5 * np.array([np.cos(yaw), np.sin(yaw)])
-        tip = tip + [np.sum(np.cos(angles)), np.sum(np.sin(angles))]
+        tip += np.sum([np.cos(angles), np.sin(angles)], axis=1)
         np.testing.assert_allclose(tip, handle[:2], atol=1e-6)
 
 
