@@ -24,6 +24,8 @@ from jffsr.types import Array, Scalar, Vector3
 LOOKS_AWAY = 1e6
 """Added to the criterion where the handle looks away from the tool: such times come last."""
 
+_ITERATIONS = {False: 8, True: 20}
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class GraspCandidates:
 @dataclass(frozen=True)
 class CandidateSettings:
     """times, how many, at least `apart` s from each other, of `window`, s, at every `step` s; starts of inverse
-    kinematics at each time, and how many postures of them are kept."""
+    kinematics at each time, and how many postures of them are kept; largest_bow, rad or m, of the joints' ways there,
+    which at zero are straight; iterations of inverse kinematics, by default 8 or, with bent ways, 20."""
 
     window: tuple[float, float] = (15.0, 60.0)
     step: float = 1.0
@@ -57,7 +60,7 @@ class CandidateSettings:
     apart: float = 4.0
     starts: int = 6
     postures: int = 3
-    iterations: int = 8
+    iterations: int | None = None
     num_steps: int = 16
     largest_bow: float = 0.0
     seed: int = 1
@@ -104,7 +107,7 @@ def grasp_candidates(
         largest_bow=settings.largest_bow,
         base_mode=base_mode,
         end_effector=end_effector,
-        iterations=settings.iterations,
+        iterations=settings.iterations or _ITERATIONS[settings.largest_bow > 0],
         num_steps=settings.num_steps,
     )
     error = found.position_error + found.attitude_error

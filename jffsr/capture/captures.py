@@ -30,7 +30,7 @@ from jffsr.dynamics.base_mode import FLOATING
 from jffsr.errors import InputError
 from jffsr.objectives.clearance import MISS, Clearance
 from jffsr.parallel.devices import all_devices
-from jffsr.parallel.mapping import spread
+from jffsr.parallel.mapping import batch_size, spread
 from jffsr.planning.plan import check_precision
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import ResultCode, Tolerances, result_code
@@ -175,10 +175,12 @@ def plan_captures(
 @program(static_argnums=(2, 3, 4))
 def _candidates(batch, shared, settings: CandidateSettings, end_effector, base_mode):
     """Candidates of each task, and whether its start is free of collision, (K,)."""
-    robot, state, starts, momentum = shared
+    count = batch_size(batch)
+    # What is spread over several devices may not close over arrays.
+    shared = jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *jnp.shape(x))), shared)
 
     def one(item) -> tuple[GraspCandidates, Array]:
-        path, model = item
+        (path, model), (robot, state, starts, momentum) = item
         found = grasp_candidates(
             robot, path, state, starts, model, settings, end_effector, momentum, base_mode
         )
@@ -187,7 +189,7 @@ def _candidates(batch, shared, settings: CandidateSettings, end_effector, base_m
             return found, jnp.array(True)
         return found, least_clearance(model, robot, path, jnp.zeros(()), state) > 0
 
-    return spread(one, batch)
+    return spread(one, (batch, shared))
 
 
 def _problem(
@@ -200,15 +202,7 @@ def _problem(
     momentum: Array | None,
     base_mode: str,
 ) -> Problem:
-    clearance = None
-    if task.clearance is not None:
-        keep = Clearance(
-            task.clearance,
-            np.asarray(settings.margin + settings.guard),
-            tolerance=np.asarray(settings.guard / MISS),
-            windows=settings.windows,
-        )
-        clearance = TargetClearance(task.path, keep)
+    clearance = None if task.clearance is None else keeping_clear(task.path, task.clearance, settings)
     return capture_problem(
         robot,
         task.path,
@@ -224,6 +218,17 @@ def _problem(
         momentum=momentum,
         base_mode=base_mode,
     )
+
+
+def keeping_clear(path: GraspPath, model: ClearanceModel, settings: CaptureSettings) -> TargetClearance:
+    """The constraint that margin and guard be kept at the samples, and the margin on the re-run."""
+    keep = Clearance(
+        model,
+        np.asarray(settings.margin + settings.guard),
+        tolerance=np.asarray(settings.guard / MISS),
+        windows=settings.windows,
+    )
+    return TargetClearance(path, keep)
 
 
 def _starts(

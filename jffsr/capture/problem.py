@@ -41,15 +41,17 @@ def capture_problem(
     momentum: Array | None = None,
     base_mode: str = FLOATING,
     accuracy: float = np.inf,
+    joint_acceleration: Array | None = None,
 ) -> Problem:
     """The problem whose solutions bring the tool to the grasp frame with its velocity, inside every limit.
 
-    The joints start at rest at those of initial_state and follow a clamped B-spline over `duration`, s, which is free
-    within duration_bounds where they are given; its control points stay within the position limits, and so does the
-    curve. Constraints: the grasp's pose and twist to `tolerance` (m, rad, m/s, rad/s), rates and accelerations, the
-    approach cone of half_angle, rad (None leaves it out), and `clearance`. terms, by default the base's disturbance,
-    are what is made small; `accuracy`, the index that counts as met, is infinite: every plan that keeps the constraints
-    is a success. Raises InputError where the start lies beyond a position limit.
+    The joints start as initial_state has them, at rest or, where it has a joint_velocity, with that and
+    joint_acceleration (n,), and follow a clamped B-spline over `duration`, s, which is free within duration_bounds
+    where they are given; its control points stay within the position limits, and so does a curve that starts at rest.
+    Constraints: the grasp's pose and twist to `tolerance` (m, rad, m/s, rad/s), rates and accelerations, the approach
+    cone of half_angle, rad (None leaves it out), and `clearance`. terms, by default the base's disturbance, are what is
+    made small; `accuracy`, the index that counts as met, is infinite: what keeps the constraints is a success. Raises
+    InputError where the start lies beyond a position limit.
     """
     limits = robot.limits
     law = ClampedBSpline.between(
@@ -63,11 +65,14 @@ def capture_problem(
         box=4 * np.pi,
         duration_bounds=duration_bounds,
         joint_names=robot.joint_names,
+        start_rate=initial_state.joint_velocity,
+        start_acceleration=joint_acceleration,
     )
+    kept = ("rate", "acceleration") if law.start_rate is None else ("position", "rate", "acceleration")
     robot.end_effector_index(end_effector)
     constraints: list[Constraint] = [
         GraspMatch(path, np.asarray(tolerance), end_effector),
-        joint_limits(robot, ("rate", "acceleration")),
+        joint_limits(robot, kept),
     ]
     if half_angle is not None:
         constraints.append(ApproachCone(path, np.asarray(half_angle), end_effector=end_effector))

@@ -1,4 +1,4 @@
-"""What a capture can be made to be good at: a base hardly disturbed, an arm that can push; terms of an index."""
+"""What a capture can be made good at: a base hardly disturbed, an arm that can push, being soon; terms of an index."""
 
 from __future__ import annotations
 
@@ -83,6 +83,23 @@ class LostManipulability:
         rotation = quaternion_to_matrix(self.path.frame(duration, duration)[1])
         wrench = jnp.asarray(self.wrench)
         return jnp.concatenate([rotation @ wrench[:3], rotation @ wrench[3:]])
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class ExecutionTime:
+    """How long the motion lasts, s, over `scale`; of use where the duration is free. Wang et al. 2021, eq. (16)."""
+
+    scale: Array | float = 1.0
+    name: str = field(default="execution_time", metadata={"static": True})
+
+    def value(self, robot: Robot, motion: Motion) -> Scalar:
+        """The last sample's time."""
+        return jnp.asarray(motion.time[-1])
+
+    def smooth(self, robot: Robot, motion: Motion, smoothing: Smoothing) -> Scalar:
+        """The same."""
+        return self.value(robot, motion)
 
 
 @jax.tree_util.register_dataclass

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import PlainValidator, PrivateAttr
+from pydantic import PrivateAttr
 
 from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
-from jffsr.reading.values import choice, expected, sequence, text
+from jffsr.reading.values import choice, sequence, text
 from jffsr.robots.description import (
     FIXED,
     ArmDescription,
@@ -22,32 +22,14 @@ from jffsr.robots.description import (
     PayloadDescription,
     RobotDescription,
 )
-from jffsr.robots.geometry import COLLISION, KINDS, MESH, VISUAL, Shape
+from jffsr.robots.geometry import COLLISION, VISUAL, Shape
+from jffsr.robots.shape_schema import ORIGIN, Number, ShapeModel, Triple
 
-
-def _any_float() -> PlainValidator:
-    """A number; one that is not finite passes, because the builder can name the body that it belongs to."""
-
-    def check(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise expected("a number")
-        try:
-            return float(value)
-        except OverflowError:
-            return float("inf")
-
-    return PlainValidator(check)
-
-
-Number = Annotated[float, _any_float()]
-Triple = Annotated[tuple[Number, ...], sequence("a list of 3 numbers", 3, 3)]
 Pair = Annotated[tuple[Number, ...], sequence("a pair [low, high]", 2, 2)]
 Name = Annotated[str, text(r".{1,200}", "a name of at most 200 letters")]
 Prose = Annotated[str, text(r"(?s).{0,10000}", "a text")]
 
 _MOST = 1000
-_SOLIDS = tuple(kind for kind in KINDS if kind != MESH)
-_ORIGIN = (0.0, 0.0, 0.0)
 
 
 class InertiaModel(Section):
@@ -67,25 +49,12 @@ class InertiaModel(Section):
         )
 
 
-class ShapeModel(Section):
-    """A solid on a link, for drawing and clearance; `size` as in `jffsr.robots.geometry.Shape`, in m."""
-
-    type: Annotated[Literal["box", "sphere", "cylinder", "capsule", "ellipsoid"], choice(*_SOLIDS)]
-    size: Annotated[tuple[Number, ...], sequence("a list of 1 to 3 numbers", 1, 3)]
-    position: Triple = _ORIGIN
-    rpy_deg: Triple = _ORIGIN
-    role: Annotated[Literal["both", "visual", "collision"], choice("both", "visual", "collision")] = "both"
-    colour: (
-        Annotated[tuple[Number, ...], sequence("a list of 4 numbers (red, green, blue, alpha)", 4, 4)] | None
-    ) = None
-
-
 class LinkModel(Section):
     """A rigid link."""
 
     name: Name
     mass: Number
-    com: Triple = _ORIGIN
+    com: Triple = ORIGIN
     inertia: InertiaModel
     shapes: Annotated[tuple[ShapeModel, ...], sequence("a list of shapes", 0, _MOST)] = ()
 
@@ -109,8 +78,8 @@ class JointModel(Section):
     type: Annotated[Literal["revolute", "prismatic", "fixed"], choice("revolute", "prismatic", "fixed")]
     parent: Name
     child: Name
-    position: Triple = _ORIGIN
-    rpy_deg: Triple = _ORIGIN
+    position: Triple = ORIGIN
+    rpy_deg: Triple = ORIGIN
     axis: Triple | None = None
     limits: LimitsModel = LimitsModel()
 
@@ -120,8 +89,8 @@ class EndEffectorModel(Section):
 
     name: Name
     link: Name
-    position: Triple = _ORIGIN
-    rpy_deg: Triple = _ORIGIN
+    position: Triple = ORIGIN
+    rpy_deg: Triple = ORIGIN
 
 
 class ArmModel(Section):
@@ -129,8 +98,8 @@ class ArmModel(Section):
 
     robot: Annotated[str, text(r".{1,1000}", "a robot's catalogue name, or the path of its file")]
     link: Name | None = None
-    position: Triple = _ORIGIN
-    rpy_deg: Triple = _ORIGIN
+    position: Triple = ORIGIN
+    rpy_deg: Triple = ORIGIN
     base: Annotated[Literal["keep", "drop"], choice("keep", "drop")] = "keep"
     prefix: Annotated[str, text(r".{0,200}", "a text of at most 200 letters")] = ""
 
@@ -139,8 +108,8 @@ class PayloadModel(LinkModel):
     """A rigid body held by an end effector, which its frame is placed in."""
 
     end_effector: Name
-    position: Triple = _ORIGIN
-    rpy_deg: Triple = _ORIGIN
+    position: Triple = ORIGIN
+    rpy_deg: Triple = ORIGIN
 
 
 class RobotModel(Section):

@@ -14,13 +14,18 @@ from jffsr.errors import InputError
 from jffsr.reading.complaints import complaint
 from jffsr.reading.did_you_mean import hint, listed
 from jffsr.reading.sources import Sources
+from jffsr.study.capture.schema import CaptureConfig
 from jffsr.study.composition import compose
 from jffsr.study.lookup import find_config
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.tracking.schema import TrackingConfig
 
-Study = PlanningConfig | TrackingConfig
-KINDS: dict[str, type[Study]] = {"planning": PlanningConfig, "tracking": TrackingConfig}
+Study = PlanningConfig | TrackingConfig | CaptureConfig
+KINDS: dict[str, type[Study]] = {
+    "planning": PlanningConfig,
+    "tracking": TrackingConfig,
+    "capture": CaptureConfig,
+}
 
 _KINDS = listed(f"'{kind}'" for kind in KINDS)
 

@@ -23,7 +23,7 @@ def open_run(path: str | Path) -> tuple[RunFolder, Problem, Any]:
     """The folder, the problem and the dataset of a finished run; InputError where something is missing."""
     folder = RunFolder(Path(path))
     problem = build_problem(folder.read_config())
-    dataset = _open(folder, "free_numbers")
+    dataset = open_result(folder, folder.result, "free_numbers")
     free = dataset["free_numbers"].to_numpy()
     lower, _ = problem.bounds()
     if free.shape != lower.shape or not np.all(np.isfinite(free)):
@@ -36,17 +36,17 @@ def open_tracking(path: str | Path) -> tuple[RunFolder, TrackingTask, Any]:
     from jffsr.study.tracking.building import build_task
 
     folder = RunFolder(Path(path))
-    return folder, build_task(folder.read_config()), _open(folder, "pose_error")
+    return folder, build_task(folder.read_config()), open_result(folder, folder.result, "pose_error")
 
 
-def _open(folder: RunFolder, variable: str) -> Any:
-    """The dataset of a finished run, which holds this variable."""
+def open_result(folder: RunFolder, file: Path, variable: str) -> Any:
+    """A dataset of a finished run, which holds this variable; InputError where it cannot be read."""
     folder.read_summary()
     try:
-        dataset = open_dataset(folder.result)
+        dataset = open_dataset(file)
         dataset[variable].load()
     except Exception as error:
-        raise InputError(f"{folder.result}: cannot be read ({error})") from None
+        raise InputError(f"{file}: cannot be read ({error})") from None
     return dataset
 
 

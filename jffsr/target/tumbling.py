@@ -7,7 +7,7 @@ in batches of times and with gradients in time, state and inertia.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -85,6 +85,13 @@ def target_motion(
     start = (jnp.asarray(initial_state.quaternion), jnp.asarray(initial_state.angular_velocity_T))
     _, (quaternion, rates, turns) = jax.lax.scan(advance, start, length=num_steps)
     return TargetMotion(target, initial_state, jnp.asarray(duration, rates.dtype), quaternion, rates, turns)
+
+
+def state_before(target: Target, state: TargetState, seconds: float) -> TargetState:
+    """Where the free target was so many seconds before: its motion with all velocities turned round."""
+    back = replace(state, velocity=-state.velocity, angular_velocity_T=-state.angular_velocity_T)
+    then = target_motion(target, back, seconds)(seconds)
+    return replace(then, velocity=-then.velocity, angular_velocity_T=-then.angular_velocity_T)
 
 
 def steps_needed(inertia: Array, angular_velocity_T: Array, duration: float) -> int:

@@ -40,14 +40,15 @@ _PER_SPAN = 32
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class ClampedBSpline:
-    """Joint motion from rest, to rest at a goal or to wherever the free control points lead.
+    """Joint motion from rest or under way, to rest at a goal or to wherever the free control points lead.
 
     start (n,), rad or m; goal (n,), or None, which leaves the end free; lower and upper (n,), the position limits,
     infinite where there is none; duration scalar, s; inner (f, n), the control points that are not fixed by an end;
     box scalar, the half width of the box of each about the straight way from start to goal (about the start without a
     goal), cut at the position limits. degree is static. duration_bounds (2,), s, makes the duration a further free
-    number, the last. Raises InputError (from `between`) for sizes that differ, a start or goal outside the limits, a
-    degree below 3, too few control points, or a duration or box that is not positive.
+    number, the last. start_rate and start_acceleration (n,), None for rest: the second and third control points follow
+    from them, and may lie beyond the position limits. Raises InputError (from `between`) for sizes that differ, a start
+    or goal outside the limits, a degree below 3, too few control points, or a duration or box that is not positive.
     """
 
     start: Array
@@ -58,6 +59,8 @@ class ClampedBSpline:
     inner: Array
     box: Array = field(default_factory=lambda: np.array(DEFAULT_BOX))
     duration_bounds: Array | None = None
+    start_rate: Array | None = None
+    start_acceleration: Array | None = None
     degree: int = field(default=4, metadata={"static": True})
 
     @classmethod
@@ -74,6 +77,8 @@ class ClampedBSpline:
         box: float = DEFAULT_BOX,
         duration_bounds: tuple[float, float] | None = None,
         joint_names: Sequence[str] | None = None,
+        start_rate: Array | None = None,
+        start_acceleration: Array | None = None,
     ) -> ClampedBSpline:
         """A checked trajectory from host numbers; control_points counts the fixed ones too.
 
@@ -103,13 +108,14 @@ class ClampedBSpline:
             box=checked_box(box),
             duration_bounds=checked_duration_bounds(duration_bounds),
             degree=degree,
+            **_under_way(ends["start"], start_rate, start_acceleration),
         )
         return law if inner is not None else replace(law, inner=np.asarray(law._straight()))
 
     @property
     def control_points(self) -> Array:
         """All control points (K, n), those that the ends fix included."""
-        parts = [jnp.tile(self.start, (_REST, 1)), jnp.asarray(self.inner)]
+        parts = [self._beginning(), jnp.asarray(self.inner)]
         if self.goal is not None:
             parts.append(jnp.tile(self.goal, (_REST, 1)))
         return jnp.concatenate(parts)
@@ -159,7 +165,9 @@ class ClampedBSpline:
         """What is asked for at both ends: rest at the start, and rest at the goal or nothing."""
         zero = jnp.zeros_like(jnp.asarray(self.start))
         end = Boundary(None, None, None) if self.goal is None else Boundary(self.goal, zero, zero)
-        return Boundary(self.start, zero, zero), end
+        if self.start_rate is None:
+            return Boundary(self.start, zero, zero), end
+        return Boundary(self.start, self.start_rate, self.start_acceleration), end
 
     def free_bounds(self) -> tuple[Vector, Vector]:
         """Lower and upper bounds of the free numbers: the inner control points one after another, then the duration."""
@@ -178,12 +186,39 @@ class ClampedBSpline:
         duration = self.duration if self.duration_bounds is None else free[size]
         return replace(self, inner=jnp.reshape(free[:size], shape), duration=duration)
 
+    def _beginning(self) -> Array:
+        """The first three control points (3, n): those of position, rate and acceleration at the start."""
+        if self.start_rate is None:
+            return jnp.tile(self.start, (_REST, 1))
+        knots, p = self.knots, self.degree
+        first, second = knots[p + 1], knots[p + 2]
+        slope = self.start_rate * self.duration
+        bend = self.start_acceleration * self.duration**2
+        after = self.start + first / p * slope
+        third = after + second / p * (slope + first / (p - 1) * bend)
+        return jnp.stack([jnp.asarray(self.start), after, third])
+
     def _straight(self) -> Array:
         """Inner control points (f, n) evenly on the way from start to goal, or at the start."""
         count = self.inner.shape[0]
         share = np.arange(1, count + 1)[:, None] / (count + 1)
         change = 0.0 if self.goal is None else self.goal - self.start
         return self.start + share * change
+
+
+def _under_way(start: np.ndarray, rate: Array | None, acceleration: Array | None) -> dict[str, Array]:
+    """The fields of a start that is not at rest; one of both that is missing is zero."""
+    if rate is None and acceleration is None:
+        return {}
+    zero = np.zeros_like(start)
+    given = {
+        "start_rate": zero if rate is None else rate,
+        "start_acceleration": zero if acceleration is None else acceleration,
+    }
+    for name, value in given.items():
+        if np.shape(value) != start.shape:
+            raise InputError(f"{name} has the shape {np.shape(value)}; {start.shape} is expected")
+    return given
 
 
 def _differences(points: Array, degree: int, knots: np.ndarray, first: int) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from jffsr.study.capture.schema import CaptureConfig
 from jffsr.study.reviewing import open_run, open_tracking
 from jffsr.study.run_folder import RunFolder
 from jffsr.study.tracking.schema import TrackingConfig
@@ -16,7 +17,14 @@ def draw_run(path: str | Path, kinds: Sequence[str] = KINDS) -> list[Path]:
 
     kinds are of "png" and "pdf".
     """
-    if isinstance(RunFolder(Path(path)).read_config(), TrackingConfig):
+    config = RunFolder(Path(path)).read_config()
+    if isinstance(config, CaptureConfig):
+        from jffsr.study.capture.reviewing import open_capture
+        from jffsr.viz.capture import save_capture_figures
+
+        folder, study, dataset, solutions = open_capture(path)
+        return save_capture_figures(study.robot, study.geometry, dataset, solutions, folder.figures, kinds)
+    if isinstance(config, TrackingConfig):
         from jffsr.viz.tracking import save_tracking_figures
         from jffsr.viz.tracking_runs import runs_of
 

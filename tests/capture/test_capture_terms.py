@@ -11,7 +11,7 @@ import pytest
 import jffsr
 from jffsr.capture.checks import check_capture
 from jffsr.capture.grasp_path import GraspPath
-from jffsr.capture.terms import BaseDisturbance, IndexAtMost, LostManipulability
+from jffsr.capture.terms import BaseDisturbance, ExecutionTime, IndexAtMost, LostManipulability
 from jffsr.objectives.composite import CompositeIndex
 from jffsr.robots.geometry import BOX, Geometry, Shape
 from jffsr.target.body import Target
@@ -49,6 +49,11 @@ def test_base_disturbance_is_the_weighted_displacement_and_the_sine_of_half_the_
     np.testing.assert_allclose(term.value(None, run), expected, rtol=1e-12)
     limit = IndexAtMost(CompositeIndex((term,)), 1.0)
     np.testing.assert_allclose(limit.inequality(None, run), [expected - 1.0], rtol=1e-12)
+
+
+def test_execution_time_is_the_time_of_the_last_sample():
+    index = CompositeIndex((ExecutionTime(scale=4.0),))
+    np.testing.assert_allclose(index.value(None, moved(0.1, np.zeros(3))), 10.0 / 4.0, rtol=1e-15)
 
 
 def test_the_wrench_is_given_in_the_grasp_frame_at_the_grasps_time(motion):

@@ -60,7 +60,10 @@ def test_the_path_begins_where_the_tool_is_or_where_it_is_told():
 @pytest.mark.parametrize(
     ("overrides", "sentence"),
     [
-        (["kind=trackin"], "found 'trackin', 'planning' or 'tracking' is expected; did you mean 'tracking'?"),
+        (
+            ["kind=trackin"],
+            "found 'trackin', 'planning', 'tracking' or 'capture' is expected; did you mean 'tracking'?",
+        ),
         (["tracker.method=adaptve"], "tracker.method: found 'adaptve', "),
         (["compare.damped.metod=x"], "compare.damped.metod: unknown key; did you mean 'method'?"),
         (["path.order=XYY"], "path.order: found 'XYY', three axes such as 'ZYX'"),

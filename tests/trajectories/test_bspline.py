@@ -75,6 +75,29 @@ def test_both_ends_are_at_rest_or_only_the_start():
             assert np.min(np.abs(at_end[1])) > 0.1
 
 
+@pytest.mark.parametrize(("degree", "count", "goal"), SIZES)
+def test_a_start_under_way_has_the_rate_and_acceleration_asked_for(degree, count, goal):
+    rate, acceleration = np.array([0.3, -0.2, 0.5]), np.array([-0.04, 0.1, 0.02])
+    law = random_spline(degree, count, goal, start_rate=rate, start_acceleration=acceleration)
+    peer = BSpline(law.knots, np.asarray(law.control_points), degree)
+    for order, asked in enumerate((START, rate, acceleration)):
+        np.testing.assert_allclose(peer(0.0, nu=order) / DURATION**order, asked, rtol=0, atol=1e-13)
+    at_start, at_end = law.boundary()
+    assert at_start.rate is rate
+    assert at_start.acceleration is acceleration
+    rest = random_spline(degree, count, goal)
+    assert (at_end.position is None) == (rest.goal is None)
+    # Nothing but the beginning has changed.
+    np.testing.assert_array_equal(law.control_points[3:], rest.control_points[3:])
+
+
+def test_a_missing_rate_is_zero_and_a_wrong_one_is_refused():
+    law = random_spline(start_acceleration=np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_array_equal(law.start_rate, np.zeros(3))
+    with pytest.raises(InputError, match=r"start_rate has the shape \(2,\); \(3,\) is expected"):
+        random_spline(start_rate=np.zeros(2))
+
+
 def test_the_box_is_about_the_straight_way_and_inside_the_limits_which_then_hold():
     lower, upper = np.array([-2.0, -0.6, 0.0]), np.array([3.0, 1.3, 4.0])
     law = ClampedBSpline.between(START, GOAL, DURATION, 4, 9, lower, upper, box=1.0)

@@ -12,6 +12,7 @@ from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.study.building import build_robot
 from jffsr.study.calls import called_function
+from jffsr.study.start import chosen_end_effector, start_state
 from jffsr.study.tracking.schema import TrackingConfig
 from jffsr.study.tracking.schema_path import ARC, CALL, FASTEST, LINE, QUINTIC, SPLINE, WAYPOINTS
 from jffsr.study.tracking.schema_tracker import Secondary
@@ -54,8 +55,8 @@ class TrackingTask:
 def build_task(config: TrackingConfig) -> TrackingTask:
     """The task; InputError with file, line and key where the robot, its start and the path do not fit."""
     robot = build_robot(config)
-    start = _start(config, robot)
-    end_effector = _end_effector(config, robot)
+    start = start_state(config, robot)
+    end_effector = chosen_end_effector(config, robot, "follow a path")
     path = build_path(config, _tool_pose(robot, start, end_effector))
     momentum, base_mode = np.array(config.task.momentum), config.task.base_mode
     if config.timing.kind == FASTEST:
@@ -89,35 +90,6 @@ def _fastest(
     except InputError as error:
         raise InputError(f"{config.where('timing.kind')}: {error}") from None
     return stretched(timing, tracker.period)
-
-
-def _start(config: TrackingConfig, robot: Robot) -> State:
-    task = config.task
-    where, q = config.where(f"task.{task.key_of('start')}"), np.array(task.si("start"))
-    if q.size != robot.num_joints:
-        raise InputError(
-            f"{where}: found {q.size} numbers, robot '{robot.name}' has {robot.num_joints} joints"
-        )
-    lower, upper = robot.limits.position_lower, robot.limits.position_upper
-    for i in np.flatnonzero((q < lower) | (q > upper)):
-        raise InputError(
-            f"{where}: {robot.joint_names[i]}: {q[i]:g} lies outside its range [{lower[i]:g}, {upper[i]:g}] "
-            "(rad or m); a value inside is expected"
-        )
-    return State(np.array(task.base_position), np.array(task.base_quaternion), q)
-
-
-def _end_effector(config: TrackingConfig, robot: Robot) -> str:
-    names, asked = robot.end_effector_names, config.task.end_effector
-    if not names:
-        raise InputError(
-            f"{config.where('robot')}: robot '{robot.name}' has no end effector, which could follow a path"
-        )
-    if asked is not None and asked not in names:
-        raise InputError(
-            f"{config.where('task.end_effector')}: found '{asked}', robot '{robot.name}' has {', '.join(names)}"
-        )
-    return asked or names[0]
 
 
 def _tool_pose(robot: Robot, state: State, end_effector: str) -> tuple[np.ndarray, np.ndarray]:
