@@ -30,15 +30,18 @@ from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array, Scalar
 
-ROUNDS = 3
-"""Of the levels between the ends, each begun from what the one before left."""
+ROUNDS = ((1e-3, False), (1e-3, True), (0.03, False), (0.03, True))
+"""Of the levels between the ends: how far inside their limits the inequalities are driven, so that what is not verified
+is tried again further in, and whether a level begins from its neighbour above, which does not keep it."""
 
 STEPS = 40
 """Trials of each lane in a round."""
 
 INSIDE = (1e-3, 0.03, 0.1)
-"""How far inside their limits the inequalities are driven, by the round: a level whose descent is not verified is tried
-again further in."""
+"""The same of the lanes that seek the ends."""
+
+_ALIKE = 1e-4
+"""Members nearer to each other than this, relative to the extent of the set, are one."""
 
 _LOST = "lost_"
 
@@ -120,8 +123,8 @@ def capture_front(
         raise InputError(f"levels is {levels}; 2 or more are expected")
     search = _Search(plan, pair, levels, settings or CaptureSettings(), end_effector)
     search.find_ends()
-    for round_number in range(ROUNDS):
-        search.go_between(INSIDE[min(round_number, len(INSIDE) - 1)])
+    for inside, from_above in ROUNDS:
+        search.go_between(inside, from_above)
     return search.front()
 
 
@@ -157,13 +160,19 @@ class _Search:
             start = np.stack([self.plans[best[k]].free for k in which])
             self._lower(start, np.eye(2)[which], np.full((self._lanes, 2), np.inf), inside)
 
-    def go_between(self, inside: float) -> None:
-        """The second index under levels of the first, from the best that is known at each level."""
+    def go_between(self, inside: float, from_above: bool) -> None:
+        """The second index under levels of the first, from the best that is known at each, or the next above it."""
         ends = np.argmin(self.values, axis=0)
         first = self.values[ends, 0]
         levels = first[0] + (first[1] - first[0]) * np.arange(1, self._lanes + 1) / (self._lanes + 1)
         allowed = self.values[None, :, 0] <= levels[:, None] + 1e-12
         start = np.argmin(np.where(allowed, self.values[None, :, 1], np.inf), axis=1)
+        if from_above:
+            front = not_dominated(self.values)
+            above = np.where(
+                self.values[None, front, 0] > levels[:, None], self.values[None, front, 0], np.inf
+            )
+            start = front[np.argmin(above, axis=1)]
         limits = np.column_stack([levels, np.full(self._lanes, np.inf)])
         weights = np.tile([0.0, 1.0], (self._lanes, 1))
         free = np.stack([self.plans[number].free for number in start])
@@ -173,6 +182,7 @@ class _Search:
         """What is not dominated."""
         kept = not_dominated(self.values)
         kept = kept[np.argsort(self.values[kept, 0])]
+        kept = kept[_apart(self.values[kept])]
         values = self.values[kept]
         extent = np.ptp(values, axis=0)
         scaled = (values - values.min(axis=0)) / np.where(extent > 0, extent, 1.0)
@@ -207,3 +217,19 @@ class _Search:
         values = [[one.terms[term.name].weighted for term in self._pair] for one in new]
         self.plans += new
         self.values = np.concatenate([self.values, np.reshape(values, (-1, 2))])
+
+
+def _apart(values: np.ndarray) -> list[int]:
+    """Numbers of those of a front's members (K, 2), by the first index, that are not next to one taken before.
+
+    Of a cluster its last is taken, the better in the second index; the first member always stays.
+    """
+    extent = np.ptp(values, axis=0)
+    extent = np.where(extent > 0, extent, 1.0)
+    taken = [0]
+    for number in range(1, len(values)):
+        if np.max(np.abs(values[number] - values[taken[-1]]) / extent) > _ALIKE:
+            taken.append(number)
+        elif taken[-1] != 0:
+            taken[-1] = number
+    return taken
