@@ -51,7 +51,8 @@ class CapturePlan:
 
     free (k,), the free numbers of `problem`; motion; verification, of the independent re-run; terms of the index by
     name; error (12,), pose and velocity of the tool less the grasp frame's, m, rad, m/s, rad/s; duration, s;
-    before, the index of the plan that the search began to better.
+    before, the index of the plan that the search began to better; attempts, starts that were tried, and jacobians,
+    derivatives of the constraints that were spent, by the bettering too.
     """
 
     result: CaptureResult
@@ -62,6 +63,8 @@ class CapturePlan:
     terms: dict[str, TermValue] | None = None
     error: np.ndarray | None = None
     before: float | None = None
+    attempts: int = 0
+    jacobians: int = 0
 
     @property
     def duration(self) -> float | None:
@@ -118,7 +121,8 @@ def plan_capture(
     )
     problem = replace(found.problems[0], objective=objective)
     (plan,) = verified_plans([problem], found.free[:1], settings, end_effector)
-    plan = replace(plan, result=result)
+    spent = int(found.jacobians[0])
+    plan = replace(plan, result=result, attempts=int(found.attempts[0]), jacobians=spent)
     if not result.success or not improve:
         return plan
     finer = replace(problem, num_steps=FINER * problem.num_steps)
@@ -126,12 +130,13 @@ def plan_capture(
     best = plan
     for _ in range(improve):
         better = improve_many([finer] * len(INSIDE), np.tile(best.free, (len(INSIDE), 1)), methods)
+        spent += int(np.sum(better.jacobians))
         tried = verified_plans([finer] * len(INSIDE), better.free, settings, end_effector)
         tried = [one for one in tried if one.result.success and one.cost < best.cost]
         if not tried:
             break
         best = min(tried, key=lambda one: one.cost)
-    return replace(best, before=plan.cost)
+    return replace(best, before=plan.cost, attempts=plan.attempts, jacobians=spent)
 
 
 def verified_plans(

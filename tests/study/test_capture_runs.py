@@ -58,7 +58,12 @@ def away(config, tmp_path_factory):
 
 
 def test_a_handle_that_looks_away_is_no_success(away, capsys):
-    assert {path.name for path in away.iterdir()} == {"config.yaml", "summary.json", "result.nc"}
+    assert {path.name for path in away.iterdir()} == {
+        "config.yaml",
+        "summary.json",
+        "result.nc",
+        "metrics.jsonl",
+    }
     summary = summary_of(away)
     assert summary["kind"] == "capture"
     assert (summary["result"]["code"], summary["result"]["name"]) == (1, "never_facing")
@@ -123,6 +128,8 @@ def test_a_captured_target_is_where_the_tool_is(captured):
     assert summary["result"]["name"] == "captured"
     assert max(summary["grasp_error"].values()) < 1e-6
     assert 10 <= summary["duration"] <= 30
+    assert summary["attempts"] >= 1
+    assert summary["evaluations"]["gradient"] >= summary["attempts"]
     assert summary["terms"]["base_disturbance"]["value"] > 0
     # The last posture, by kinematics alone, and the handle, by the target's motion alone.
     study = build_study(load_config(captured / "config.yaml"))

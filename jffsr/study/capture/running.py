@@ -44,10 +44,13 @@ def _finish(
     folder: RunFolder, config: CaptureConfig, study: CaptureStudy, found: PlannedCapture, watch: Stopwatch
 ) -> None:
     """Write the arrays, then the summary, which marks the run as finished."""
+    summary = capture_summary(config, study, found, watch.as_dict())
+    folder.metrics.unlink(missing_ok=True)
+    folder.add_metrics(**{key: summary[key] for key in ("attempts", "evaluations", "cost_before", "cost")})
     if found.front is not None:
         (folder.path / FRONT).mkdir(exist_ok=True)
         for name, number in found.front.chosen.items():
             dataset = solution_dataset(config, study, found, found.front.plans[number])
             save_dataset(dataset, folder.path / FRONT / f"{name}.nc")
     save_dataset(capture_dataset(config, study, found), folder.result)
-    write_json(folder.summary, capture_summary(config, study, found, watch.as_dict()))
+    write_json(folder.summary, summary)

@@ -42,7 +42,9 @@ def capture_summary(
         "grasp_time": _grasp_time(found.chosen, found.age),
         "duration": None if plan is None else plan.duration,
         "grasp_error": None if plan is None else sizes(plan.error),
-        "evaluations": {"objective": None, "gradient": None},
+        "attempts": 0 if found.plan is None else found.plan.attempts,
+        # Values come along with derivatives.
+        "evaluations": {"objective": 0, "gradient": 0 if found.plan is None else found.plan.jacobians},
         "seconds": dict(seconds),
         "seed": config.seed,
         "versions": versions(),
@@ -142,7 +144,8 @@ def summary_text(summary: dict[str, Any]) -> str:
     lines.append(f"  grasp time    {summary['grasp_time']['sentence']}")
     if summary["duration"] is not None:
         lines.append(f"  grasp         '{summary['grasp']}' after {summary['duration']:.4g} s")
-        lines.append(f"  missed by     {_sizes(summary['grasp_error'])}")
+        spent = f"{summary['attempts']} starts, {summary['evaluations']['gradient']} derivatives"
+        lines.append(f"  missed by     {_sizes(summary['grasp_error'])}; {spent}")
         for name, term in summary["terms"].items():
             lines.append(f"  {name:<22}{_number(term['value']):>12}")
         if summary["cost_before"] is not None:
