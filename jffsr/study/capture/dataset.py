@@ -147,8 +147,7 @@ def _motion(config, study: CaptureStudy, found: PlannedCapture, plan: CapturePla
         "grasp_error": of(
             ("time", "error"), seen.error, "m, rad, m/s, rad/s", "tool less grasp frame; rotation vector"
         ),
-        "target_position": of(axes, seen.target.position, "m", "target's centre of mass, inertial frame"),
-        "target_quaternion": of(component, seen.target.quaternion, "1", "target to inertial frame"),
+        **_target(seen.target),
         "momentum": of("twist", study.momentum, "N s, N m s", "linear, angular about the centre of mass"),
         "joint_position_lower": of("joint", limits.position_lower, unit, "lower position limit"),
         "joint_position_upper": of("joint", limits.position_upper, unit, "upper position limit"),
@@ -174,6 +173,8 @@ def _motion(config, study: CaptureStudy, found: PlannedCapture, plan: CapturePla
     if found.observed is not None:
         true = jax.device_get(_followed(robot, motion, found.true_path, study.end_effector))
         variables |= {
+            # The true target, whose shapes are given in these axes; an estimated one has those of the marker.
+            **_target(true.target),
             "true_grasp_position": of(axes, true.grasp[0], "m", "true grasp frame, inertial frame"),
             "true_grasp_error": of(
                 ("time", "error"), true.error, "m, rad, m/s, rad/s", "tool less true grasp frame"
@@ -186,6 +187,15 @@ def _motion(config, study: CaptureStudy, found: PlannedCapture, plan: CapturePla
             ),
         }
     return variables, coordinates
+
+
+def _target(states: TargetState) -> dict:
+    return {
+        "target_position": of(
+            ("time", "axis"), states.position, "m", "target's centre of mass, inertial frame"
+        ),
+        "target_quaternion": of(("time", "component"), states.quaternion, "1", "target to inertial frame"),
+    }
 
 
 def distances(model: ClearanceModel, robot: Robot, motion: Motion, target: TargetState) -> np.ndarray:
