@@ -111,15 +111,18 @@ def test_a_grasp_point_inside_the_body_is_told(config, tmp_path):
     assert summary_of(tmp_path / "inside")["result"]["name"] == "grasp_inside_body"
 
 
-@pytest.fixture(scope="module")
-def captured(config, tmp_path_factory):
-    """A capture run in a process of its own, so that it has all cores, as a user's has."""
-    folder = tmp_path_factory.mktemp("runs") / "captured"
-    command = [sys.executable, "-m", "jffsr.cli", "run", str(config), "--out", str(folder)]
+def captured_by(config, folder, *overrides: str):
+    """The folder of a capture run in a process of its own, so that it has all cores, as a user's has."""
+    command = [sys.executable, "-m", "jffsr.cli", "run", str(config), *overrides, "--out", str(folder)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=900)
-    assert done.returncode == cli.MET, done.stderr
+    assert done.returncode == cli.MET, done.stdout + done.stderr
     assert "captured: pose and velocity match" in done.stdout
     return folder
+
+
+@pytest.fixture(scope="module")
+def captured(config, tmp_path_factory):
+    return captured_by(config, tmp_path_factory.mktemp("runs") / "captured")
 
 
 @pytest.mark.slow
@@ -176,3 +179,32 @@ def test_an_estimate_that_has_not_converged_is_no_ground_for_a_plan(config, tmp_
     for name, deviation in observed["predicted_deviation"].items():
         assert observed["prediction_error"][name] < 5 * deviation
     assert summary["duration"] is None
+
+
+@pytest.mark.slow
+def test_an_observed_target_is_met_as_well_as_it_is_known(config, captured, tmp_path):
+    """A good camera, and a match loose enough for an arm that cannot leave its plane."""
+    seen = "observation={duration: 4, acquisition: 30, camera: {noise: 0.02}}"
+    turned = "target.marker={position: [0.02, -0.01, 0], rotation_vector_deg: [0, 0, 70]}"
+    folder = captured_by(config, tmp_path / "seen", seen, turned, "planner.tolerance=0.02")
+    summary, dataset = summary_of(folder), open_dataset(folder / "result.nc")
+    observed = summary["observation"]
+    assert observed["converged"]
+    # The tool is within the match's tolerance of the prediction, and that within its deviations of the truth.
+    for name, deviation in observed["predicted_deviation"].items():
+        assert summary["grasp_error"][name] < 0.02
+        assert observed["prediction_error"][name] < 5 * deviation
+        most = summary["grasp_error"][name] + observed["prediction_error"][name]
+        assert observed["error_to_true_target"][name] < 1.01 * most
+    # The target is told where it really is, its axes those of its shapes; not where it is thought to be.
+    study = build_study(load_config(folder / "config.yaml"))
+    end = study.motion(summary["duration"])
+    np.testing.assert_allclose(dataset["target_position"][-1], end.position, atol=1e-12)
+    np.testing.assert_allclose(dataset["target_quaternion"][-1], end.quaternion, atol=1e-12)
+    error = dataset["true_grasp_error"].to_numpy()[-1]
+    assert np.linalg.norm(error[:3]) == pytest.approx(observed["error_to_true_target"]["position_m"])
+    np.testing.assert_allclose(
+        dataset["tool_position"][-1] - dataset["true_grasp_position"][-1], error[:3], atol=1e-12
+    )
+    assert cli.main(["show", str(folder)]) == cli.MET
+    assert cli.main(["check", str(folder)]) == cli.MET
