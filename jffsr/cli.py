@@ -34,6 +34,7 @@ examples:
   jffsr run composite_wu6 optimizer.particles=64 task.duration=25 --out runs/faster
   jffsr sweep composite_wu6 task.duration=20,25,30 seeds=20 --out runs/durations
   jffsr run wu_2018
+  jffsr run tumbling_box
   jffsr check runs/composite_wu6
   jffsr robots wu_6dof
   jffsr map servicer_7dof

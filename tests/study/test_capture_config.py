@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.spatial.transform import Rotation
 
+from jffsr.capture.front import CaptureFront
 from jffsr.capture.manipulability import MEASURES
 from jffsr.capture.problem import NUM_STEPS
 from jffsr.errors import InputError
 from jffsr.study.capture import schema_planner
 from jffsr.study.capture.building import build_settings, build_study, build_terms
+from jffsr.study.capture.dataset import front_variables
+from jffsr.study.capture.summary import front_summary
 from jffsr.study.config import dump_config, load_config
+from jffsr.study.dataset import open_dataset, save_dataset
 from jffsr.study.planning import plan
 from jffsr.study.sweep.points import expand
 from jffsr.study.sweep.specification import read_sweep
@@ -163,3 +170,24 @@ def test_other_commands_say_what_they_are_for():
         plan(CONFIG)
     with pytest.raises(InputError, match="only planning studies are swept over"):
         expand(read_sweep(CONFIG, ["seed=1,2"]))
+
+
+def test_a_front_is_told_with_its_chosen_solutions(tmp_path):
+    plans = tuple(SimpleNamespace(free=np.full(4, float(k)), duration=20.0 + k) for k in range(3))
+    values = np.array([[0.1, 0.3], [0.2, 0.6], [0.5, 0.8]])
+    chosen = {"least_base_disturbance": 0, "least_lost_manipulability": 2, "balanced": 0}
+    front = CaptureFront(plans, values, ("base_disturbance", "manipulability"), chosen)
+    variables = front_variables(front)
+    save_dataset(xr.Dataset(variables), tmp_path / "front.nc")
+    dataset = open_dataset(tmp_path / "front.nc")
+    np.testing.assert_array_equal(dataset["front_value"], values)
+    names = ["least_base_disturbance, balanced", "", "least_lost_manipulability"]
+    assert dataset["front_chosen"].values.tolist() == names
+    assert dataset["front_duration"].values.tolist() == [20.0, 21.0, 22.0]
+    told = front_summary(front)
+    assert told["solutions"] == 3
+    assert told["chosen"]["least_lost_manipulability"] == {
+        "number": 2,
+        "values": {"base_disturbance": 0.5, "manipulability": 0.8},
+        "duration": 22.0,
+    }

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from jffsr.capture.front import CaptureFront
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.plan import CapturePlan
 from jffsr.capture.tool_motion import ToolSamples, tool_samples
@@ -48,7 +49,7 @@ def capture_dataset(config: CaptureConfig, study: CaptureStudy, found: PlannedCa
         more, places = _motion(config, study, found, found.plan)
         variables, coordinates = variables | more, coordinates | places
     if found.front is not None:
-        variables |= _front(found.front)
+        variables |= front_variables(found.front)
         coordinates["index"] = ("index", list(found.front.names))
     return xarray.Dataset(variables, coords=coordinates, attrs=_attributes(config, study, found))
 
@@ -203,7 +204,8 @@ def distances(model: ClearanceModel, robot: Robot, motion: Motion, target: Targe
     return np.asarray(clearances(model, robot, motion, target if model.has_target else None))
 
 
-def _front(front) -> dict:
+def front_variables(front: CaptureFront) -> dict:
+    """Variables of every solution of a front, and what each was chosen as."""
     free = np.stack([plan.free for plan in front.plans])
     chosen = np.array(["" for _ in front.plans], dtype=object)
     for name, number in front.chosen.items():

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import jax
 import numpy as np
 
+from jffsr.capture.front import CaptureFront, capture_front
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.grasp_time import GraspTime, GraspTimeCode, grasp_time
 from jffsr.capture.match import grasp_error
@@ -51,7 +51,7 @@ class PlannedCapture:
     prediction_error: np.ndarray | None = None
     true_error: np.ndarray | None = None
     plan: CapturePlan | None = None
-    front: Any | None = None
+    front: CaptureFront | None = None
 
     @property
     def time(self) -> float | None:
@@ -124,8 +124,6 @@ def _planned(config, study: CaptureStudy, found: PlannedCapture, geometry, time,
         error = _missed(study.robot, plan.motion, found.true_path, study.end_effector)
         found = replace(found, true_error=np.asarray(error))
     if config.front is not None and plan.result.success:
-        from jffsr.capture.front import capture_front
-
         say("tracing the front")
         front = capture_front(
             plan,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.capture.front import CaptureFront
 from jffsr.capture.grasp_time import GraspTime
 from jffsr.capture.plan import CapturePlan
 from jffsr.objectives.constraints import tolerance_of
@@ -50,7 +51,7 @@ def capture_summary(
         "versions": versions(),
         "verification": {} if plan is None else _verification(plan),
         "observation": None if found.observed is None else _observation(found),
-        "front": None if found.front is None else _front(found.front),
+        "front": None if found.front is None else front_summary(found.front),
     }
 
 
@@ -121,7 +122,8 @@ def _observation(found: PlannedCapture) -> dict[str, Any]:
     }
 
 
-def _front(front) -> dict[str, Any]:
+def front_summary(front: CaptureFront) -> dict[str, Any]:
+    """How many solutions, their values, and those chosen by name."""
     return {
         "names": list(front.names),
         "solutions": len(front.plans),
