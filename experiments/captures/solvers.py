@@ -157,10 +157,9 @@ def _better(tasks: list[CaptureTask], lines: list[dict]) -> list[dict]:
     found = told(each, improve_many(each, np.repeat(free, len(INSIDE), axis=0), methods).free)
     chosen = []
     for k, line in enumerate(lines):
-        lanes = [
-            one for one in found[k * len(INSIDE) : (k + 1) * len(INSIDE)] if one["kept"] and one["within"]
-        ]
-        chosen.append(min([*lanes, _without(line)], key=lambda one: one["disturbance"]))
+        lanes = [*found[k * len(INSIDE) : (k + 1) * len(INSIDE)], _without(line)]
+        good = [one for one in lanes if one["kept"] and one["within"]]
+        chosen.append(min(good, key=lambda one: one["disturbance"], default=lanes[-1]))
     return chosen
 
 
