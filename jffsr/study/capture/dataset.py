@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
@@ -58,6 +59,9 @@ def solution_dataset(config: CaptureConfig, study: CaptureStudy, found: PlannedC
     """The Dataset of one solution of the front: the same as the plan's, without the criterion."""
     import xarray
 
+    if found.observed is not None:
+        prediction = found.observed.prediction(study.target, found.grasp, plan.duration)
+        found = replace(found, prediction=prediction)
     variables, coordinates = _motion(config, study, found, plan)
     return xarray.Dataset(variables, coords=coordinates, attrs=_attributes(config, study, found))
 
