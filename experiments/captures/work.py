@@ -29,12 +29,14 @@ from jffsr.compiling import jit
 SETTINGS = CaptureSettings(tolerance=1e-4, margin=0.02)
 AGAIN = replace(
     SETTINGS,
-    candidates=CandidateSettings(times=4, apart=2.0, starts=12, seed=2),
+    candidates=CandidateSettings(
+        times=8, apart=1.0, starts=32, postures=8, largest_bow=1.0, iterations=12, seed=2
+    ),
     control_points=12,
     num_steps=100,
     windows=16,
 )
-"""For those that the first settings do not solve: other times and postures, more freedom, a finer grid."""
+"""For those that the first settings do not solve: more times and postures, bent ways, more freedom, a finer grid."""
 
 
 def read_lines(path: Path) -> list[dict]:
