@@ -24,7 +24,7 @@ from jffsr.optimizers.interface import (
     OptimizationProblem,
     Population,
     Progress,
-    better_of,
+    after_trials,
     finite_or_inf,
     no_progress,
     sample_box,
@@ -169,16 +169,8 @@ class GradientDescent:
             best_position=jnp.where(improved[:, None], inside, descent.best_position),
             best_value=jnp.where(improved, value, descent.best_value),
         )
-        best_position, best_value = better_of(
-            progress.best_position, progress.best_value, advanced.best_position, advanced.best_value
-        )
-        progress = replace(
-            progress,
-            best_position=best_position,
-            best_value=best_value,
-            iteration=progress.iteration + 1,
-            gradient_evaluations=progress.gradient_evaluations + jnp.sum(descent.active),
-            converged=~jnp.any(advanced.active),
+        progress = after_trials(
+            progress, advanced.best_position, advanced.best_value, descent.active, advanced.active
         )
         return GradientState(state.key, advanced, progress)
 

@@ -8,7 +8,7 @@ the state, which is therefore the checkpoint. One driver runs them all.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple, Protocol
 
 import jax
@@ -106,6 +106,26 @@ def better_of(position: Vector, value: Scalar, positions: Array, values: Array) 
     index = jnp.argmin(values)
     wins = values[index] < value
     return jnp.where(wins, positions[index], position), jnp.where(wins, values[index], value)
+
+
+def after_trials(
+    progress: Progress, positions: Array, values: Array, tried: Array, active: Array
+) -> Progress:
+    """The progress after one more trial of the starts `tried` (k,), whose best points (k, d) and values (k,) these are.
+
+    Each trial cost a gradient; all has converged where no start is `active` (k,) any more.
+    """
+    best_position, best_value = better_of(
+        progress.best_position, progress.best_value, positions, finite_or_inf(values)
+    )
+    return replace(
+        progress,
+        best_position=best_position,
+        best_value=best_value,
+        iteration=progress.iteration + 1,
+        gradient_evaluations=progress.gradient_evaluations + jnp.sum(tried),
+        converged=~jnp.any(active),
+    )
 
 
 def sample_box(key: Array, problem: OptimizationProblem, count: int) -> Array:

@@ -19,7 +19,7 @@ from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import (
     Population,
     Progress,
-    better_of,
+    after_trials,
     finite_or_inf,
     no_progress,
     sample_box,
@@ -130,20 +130,7 @@ class Restoration:
             best_position=jnp.where(improved[:, None], old.trial, old.best_position),
             best_value=jnp.where(improved, value, old.best_value),
         )
-        best_position, best_value = better_of(
-            progress.best_position,
-            progress.best_value,
-            trials.best_position,
-            finite_or_inf(trials.best_value),
-        )
-        progress = replace(
-            progress,
-            best_position=best_position,
-            best_value=best_value,
-            iteration=progress.iteration + 1,
-            gradient_evaluations=progress.gradient_evaluations + jnp.sum(old.active),
-            converged=~jnp.any(trials.active),
-        )
+        progress = after_trials(progress, trials.best_position, trials.best_value, old.active, trials.active)
         return RestorationState(state.key, trials, progress)
 
     def population(self, state: RestorationState) -> Population:

@@ -24,7 +24,7 @@ from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import (
     Population,
     Progress,
-    better_of,
+    after_trials,
     finite_or_inf,
     no_progress,
     sample_box,
@@ -171,19 +171,8 @@ class SequentialQuadratic:
             best_position=jnp.where(improved[:, None], lower + width * trial, old.best_position),
             best_value=jnp.where(improved, found.merit, old.best_value),
         )
-        best_position, best_value = better_of(
-            progress.best_position,
-            progress.best_value,
-            searches.best_position,
-            finite_or_inf(searches.best_value),
-        )
-        progress = replace(
-            progress,
-            best_position=best_position,
-            best_value=best_value,
-            iteration=progress.iteration + 1,
-            gradient_evaluations=progress.gradient_evaluations + jnp.sum(old.active),
-            converged=~jnp.any(searches.active),
+        progress = after_trials(
+            progress, searches.best_position, searches.best_value, old.active, searches.active
         )
         return SequentialState(searches, progress)
 
