@@ -132,6 +132,7 @@ _HOME = {
     "capture_problem": "jffsr.capture.problem",
     "plan_capture": "jffsr.capture.plan",
     "plan_captures": "jffsr.capture.captures",
+    "different_captures": "jffsr.capture.captures",
     "CaptureTask": "jffsr.capture.captures",
     "CaptureSettings": "jffsr.capture.captures",
     "CapturePlan": "jffsr.capture.plan",

@@ -121,8 +121,83 @@ def plan_captures(
     are solved and how many are open. Raises InputError where tasks are of different structure or 64-bit floats are off;
     what has no plan says so by its code.
     """
-    check_precision("float64")
     settings, tasks = settings or CaptureSettings(), list(tasks)
+    every = _attempts(robot, tasks, initial_state, settings, end_effector, momentum, base_mode)
+    problems, task_of, count = every.problems, every.task_of, len(tasks)
+    first = np.arange(count) * (len(problems) // count)
+    sought = _Sought(first, every.starts[first, 0], count)
+    if len(every.promising):
+        found = restore_many(
+            [problems[k] for k in every.promising],
+            every.starts[every.promising],
+            task_of=task_of[every.promising],
+            lanes=settings.lanes,
+            most_steps=settings.most_steps,
+            on_progress=on_progress,
+        )
+        sought.take(found, every.promising, task_of)
+    plans = tuple(problems[k] for k in sought.problem)
+    motion, verification, verdict = reviewed(plans, sought.free, settings.step_factor)
+    code = np.where(verdict == ResultCode.ACCURACY_MET, CaptureCode.CAPTURED, CaptureCode.NOT_VERIFIED)
+    code = np.where(sought.kept, code, CaptureCode.NOT_FOUND)
+    code = np.where(every.faces, code, CaptureCode.NEVER_FACING)
+    code = np.where(every.free_at_start, code, CaptureCode.START_IN_COLLISION).astype(np.int32)
+    return Captures(
+        code, sought.free, motion.time[:, -1], motion, verification, sought.attempts, sought.jacobians, plans
+    )
+
+
+def different_captures(
+    robot: Robot,
+    task: CaptureTask,
+    initial_state: State,
+    settings: CaptureSettings | None = None,
+    *,
+    end_effector: str | None = None,
+    momentum: Array | None = None,
+    base_mode: str = FLOATING,
+) -> np.ndarray:
+    """Free numbers (m, k) that keep the constraints of one capture, from each start that leads to some; not re-run yet.
+
+    Different postures at the grasp, and different ways there: what a front of captures may begin from.
+    """
+    settings = settings or CaptureSettings()
+    every = _attempts(robot, [task], initial_state, settings, end_effector, momentum, base_mode)
+    each = every.starts.shape[1]
+    if not len(every.promising):
+        return np.zeros((0, every.starts.shape[2]))
+    found = restore_many(
+        [every.problems[k] for k in np.repeat(every.promising, each)],
+        every.starts[every.promising].reshape(-1, 1, every.starts.shape[2]),
+        lanes=settings.lanes,
+        most_steps=settings.most_steps,
+    )
+    return found.free[found.kept]
+
+
+@dataclass(frozen=True)
+class _Attempts:
+    """What can be tried: problems (K c) of each task's times, task_of them, starts (K c, s, k), the promising problems;
+    of each task (K,) whether the frame ever faces the tool, and whether the robot starts free of collision."""
+
+    problems: list[Problem]
+    task_of: np.ndarray
+    starts: np.ndarray
+    promising: np.ndarray
+    faces: np.ndarray
+    free_at_start: np.ndarray
+
+
+def _attempts(
+    robot: Robot,
+    tasks: list[CaptureTask],
+    initial_state: State,
+    settings: CaptureSettings,
+    end_effector: str | None,
+    momentum: Array | None,
+    base_mode: str,
+) -> _Attempts:
+    check_precision("float64")
     if not tasks:
         raise InputError("plan_captures was given no task")
     other = first_unlike([(task.path, task.clearance) for task in tasks])
@@ -149,27 +224,8 @@ def plan_captures(
     starts = _starts(problems, [tasks[k].path for k in task_of], candidates, settings, end_effector)
     # A time at which the frame looks away is no candidate.
     facing = candidates.criterion < LOOKS_AWAY
-    chosen = np.flatnonzero((facing & free_at_start[:, None]).ravel())
-    sought = _Sought(np.arange(count) * each, starts[::each, 0].copy(), count)
-    if len(chosen):
-        found = restore_many(
-            [problems[k] for k in chosen],
-            starts[chosen],
-            task_of=task_of[chosen],
-            lanes=settings.lanes,
-            most_steps=settings.most_steps,
-            on_progress=on_progress,
-        )
-        sought.take(found, chosen, task_of)
-    plans = tuple(problems[k] for k in sought.problem)
-    motion, verification, verdict = reviewed(plans, sought.free, settings.step_factor)
-    code = np.where(verdict == ResultCode.ACCURACY_MET, CaptureCode.CAPTURED, CaptureCode.NOT_VERIFIED)
-    code = np.where(sought.kept, code, CaptureCode.NOT_FOUND)
-    code = np.where(np.any(facing, axis=1), code, CaptureCode.NEVER_FACING)
-    code = np.where(free_at_start, code, CaptureCode.START_IN_COLLISION).astype(np.int32)
-    return Captures(
-        code, sought.free, motion.time[:, -1], motion, verification, sought.attempts, sought.jacobians, plans
-    )
+    promising = np.flatnonzero((facing & free_at_start[:, None]).ravel())
+    return _Attempts(problems, task_of, starts, promising, np.any(facing, axis=1), free_at_start)
 
 
 @program(static_argnums=(2, 3, 4))

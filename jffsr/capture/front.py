@@ -101,12 +101,14 @@ def capture_front(
     levels: int = 8,
     settings: CaptureSettings | None = None,
     end_effector: str | None = None,
+    others: np.ndarray | None = None,
 ) -> CaptureFront:
     """The Pareto set of two indices about a verified plan, by default the base's disturbance and lost manipulability.
 
-    levels: lanes side by side, two or more; settings tell the steps of the re-run. The set is what descents from this
-    plan find, so that a set about another plan of the same capture may have better members. Raises InputError for a
-    plan that is none, and for indices that are not two of different names.
+    levels: lanes side by side, two or more; settings tell the steps of the re-run. The set is what descents find from
+    this plan and from `others`, free numbers (m, k) of the same problem (`different_captures`), of which those count
+    that the re-run confirms. Raises InputError for a plan that is none, and for indices that are not two of different
+    names.
     """
     if plan.problem is None or not plan.result.success:
         raise InputError(f"a front needs a verified plan; this one: {plan.result.sentence}")
@@ -122,6 +124,8 @@ def capture_front(
     if levels < 2:
         raise InputError(f"levels is {levels}; 2 or more are expected")
     search = _Search(plan, pair, levels, settings or CaptureSettings(), end_effector)
+    if others is not None and len(others):
+        search.take_others(np.asarray(others))
     search.find_ends()
     for inside, from_above in ROUNDS:
         search.go_between(inside, from_above)
@@ -149,6 +153,19 @@ class _Search:
         self._take(np.tile(plan.free, (lanes, 1)), 1)
         if not self.plans:
             raise InputError("the plan given keeps its constraints no longer; plan it anew")
+
+    def take_others(self, free: np.ndarray) -> None:
+        """Other plans of the capture, and descents from as many of them as there are lanes, the best first."""
+        for start in range(0, len(free), self._lanes):
+            some = free[start : start + self._lanes]
+            self._take(np.concatenate([some, np.tile(some[:1], (self._lanes - len(some), 1))]), len(some))
+        rank = np.argsort(self.values, axis=0)
+        lanes = np.arange(self._lanes)
+        which = lanes % 2
+        chosen = rank[np.minimum(lanes // 2, len(rank) - 1), which]
+        start = np.stack([self.plans[number].free for number in chosen])
+        far = np.full((self._lanes, 2), np.inf)
+        self._lower(start, np.eye(2)[which], far, np.full(self._lanes, INSIDE[1]))
 
     def find_ends(self) -> None:
         """Each index alone, half of the lanes each, further inside the limits from one lane to the next."""

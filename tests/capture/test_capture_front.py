@@ -83,6 +83,16 @@ def test_the_ends_are_the_best_in_their_own_index_and_better_than_the_plan(plan,
 
 
 @pytest.mark.slow
+def test_other_captures_join_the_set(plan, front):
+    """Begun from the ends of a set, the next one is no worse there; what keeps no constraint does not enter."""
+    ends = np.stack([front.plans[0].free, front.plans[-1].free, plan.free + 0.3])
+    again = capture_front(plan, levels=LANES, settings=SETTINGS, others=ends)
+    assert all(member.result.success for member in again.plans)
+    assert again.values[0, 0] <= front.values[0, 0] + 1e-9
+    assert again.values[-1, 1] >= front.values[-1, 1] - 1e-9
+
+
+@pytest.mark.slow
 def test_no_random_capture_about_the_plan_beats_the_set(plan, front):
     """Points all about the plan's, brought to where the constraints are kept by other code than the descents."""
     rng = np.random.default_rng(5)

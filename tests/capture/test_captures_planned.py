@@ -8,7 +8,7 @@ import pytest
 
 import jffsr
 from jffsr.capture.candidates import CandidateSettings
-from jffsr.capture.captures import CaptureSettings, CaptureTask, plan_captures
+from jffsr.capture.captures import CaptureSettings, CaptureTask, different_captures, plan_captures
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.outcome import CaptureCode
 from jffsr.capture.plan import plan_capture
@@ -88,6 +88,20 @@ def test_the_captured_one_is_captured_in_mujoco_without_a_touch(captures, robot,
     tool, _ = jffsr.end_effector_pose(robot, jffsr.kinematics(robot, last))
     handle, _, _ = grasp_frame(TARGET, paths[0].motion(duration))
     np.testing.assert_allclose(tool, handle, atol=1e-6)
+
+
+def test_different_captures_keep_the_constraints_and_differ(robot, state, paths, model, captures):
+    free = different_captures(robot, CaptureTask(paths[0], model), state, SETTINGS)
+    assert len(free) >= 2
+    # One after another by its own rollout, beside the handle's pose.
+    problem = captures.problems[0]
+    for one in free:
+        motion = jax.device_get(problem.motion(one))
+        end = jffsr.State(motion.base_position[-1], motion.base_quaternion[-1], motion.joint_position[-1])
+        tool, _ = jffsr.end_effector_pose(robot, jffsr.kinematics(robot, end))
+        handle, _, _ = grasp_frame(TARGET, paths[0].motion(float(motion.time[-1])))
+        np.testing.assert_allclose(tool, handle, atol=1e-6)
+    assert np.max(np.abs(np.diff(free, axis=0))) > 0.01
 
 
 def test_a_plan_is_made_better_and_stays_one(robot, state, paths, model):

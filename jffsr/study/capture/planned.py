@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import jax
 import numpy as np
 
+from jffsr.capture.captures import CaptureTask, different_captures
 from jffsr.capture.front import CaptureFront, capture_front
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.grasp_time import GraspTime, GraspTimeCode, grasp_time
@@ -125,12 +126,17 @@ def _planned(config, study: CaptureStudy, found: PlannedCapture, geometry, time,
         found = replace(found, true_error=np.asarray(error))
     if config.front is not None and plan.result.success:
         say("tracing the front")
+        others = different_captures(
+            study.robot, CaptureTask(path, model), study.initial_state, settings, **_mode(study)
+        )
+        say(f"{len(others)} starts lead to captures")
         front = capture_front(
             plan,
             build_indices(config, study, path),
             levels=config.front.levels,
             settings=settings,
             end_effector=study.end_effector,
+            others=others,
         )
         found = replace(found, front=front)
     return found
