@@ -29,6 +29,8 @@ from jffsr.types import Array
 _STEPS = 6
 """Steps between two looks: enough that the look costs nothing, few enough that no lane idles for long."""
 
+_LANES = 32
+
 _AT_ONCE = 2
 """Lanes evaluated together on a core: the derivatives of more leave its cache."""
 
@@ -77,7 +79,7 @@ def restore_many(
     starts: np.ndarray,
     *,
     task_of: Sequence[int] | None = None,
-    lanes: int = 32,
+    lanes: int | None = None,
     most_steps: int = 60,
     method: Restoration | None = None,
     on_progress: Callable[[int, int], None] | None = None,
@@ -85,8 +87,9 @@ def restore_many(
     """Free numbers that keep the constraints of each problem, from the starts (K, s, k) in their order.
 
     Problems of one structure. Where task_of names for each the task it is a variant of, the others of a task are left
-    alone once one is solved; the first start of each variant comes before all second starts. lanes run at once; a
-    start is given up after most_steps. With more lanes than tasks several starts of a task run side by side, and the
+    alone once one is solved; the first start of each variant comes before all second starts. lanes run at once, by
+    default as many as there are starts, 32 at most; a number given is kept, so that one program does for fewer. A start
+    is given up after most_steps. With more lanes than tasks several starts of a task run side by side, and the
     first to succeed is taken. on_progress is told how many tasks are solved and how many are open. Raises
     InputError for problems or starts that do not go together.
     """
@@ -104,7 +107,7 @@ def restore_many(
     every = stacked(problems)
     work = _Work(starts, tasks)
     method = method or Restoration(starts=1)
-    lanes = min(lanes, count * starts.shape[1])
+    lanes = min(_LANES, count * starts.shape[1]) if lanes is None else lanes
     problem_of = np.full(lanes, -1)
     point = np.zeros((lanes, size))
     states, spent = None, np.zeros(lanes, dtype=int)

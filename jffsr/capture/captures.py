@@ -131,7 +131,7 @@ def plan_captures(
             [problems[k] for k in every.promising],
             every.starts[every.promising],
             task_of=task_of[every.promising],
-            lanes=settings.lanes,
+            lanes=every.lanes(settings.lanes),
             most_steps=settings.most_steps,
             on_progress=on_progress,
         )
@@ -169,7 +169,7 @@ def different_captures(
     found = restore_many(
         [every.problems[k] for k in np.repeat(every.promising, each)],
         every.starts[every.promising].reshape(-1, 1, every.starts.shape[2]),
-        lanes=settings.lanes,
+        lanes=every.lanes(settings.lanes),
         most_steps=settings.most_steps,
     )
     return found.free[found.kept]
@@ -186,6 +186,10 @@ class _Attempts:
     promising: np.ndarray
     faces: np.ndarray
     free_at_start: np.ndarray
+
+    def lanes(self, most: int) -> int:
+        """How many run at once: of how many times are promising, and so the program's shape, it does not depend."""
+        return min(most, self.starts.shape[0] * self.starts.shape[1])
 
 
 def _attempts(
