@@ -61,6 +61,7 @@ def check_mjx(report):
     assert mjx[1].compile_seconds == 0
 
 
+@pytest.mark.slow
 def test_mjx_agrees_with_mujoco(tumbled):
     """200 and 400 steps of MJX, compiled once, with momentum in all six components."""
     robot = jffsr.load_robot("hu_2011_planar2")

@@ -67,7 +67,9 @@ def damaged(number: int, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("share", range(SHARES))
+@pytest.mark.parametrize(
+    "share", [pytest.param(k, marks=[pytest.mark.slow] if k >= 4 else []) for k in range(SHARES)]
+)
 def test_damaged_files_end_well(share, small, compiled, tmp_path, capsys):
     ended = {cli.MET: 0, cli.BAD_INPUT: 0, cli.NOT_MET: 0}
     for number in range(share, 500, SHARES):

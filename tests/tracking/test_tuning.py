@@ -56,6 +56,7 @@ def test_the_genetic_algorithm_betters_the_printed_pair(problem, value):
     assert float(rate) < 1.02 * LIMIT
 
 
+@pytest.mark.slow
 def test_gradients_through_the_rollout_and_the_singularity(problem):
     """By every number that is tuned and by the path's duration, with feedback, against differences; then descent."""
     bounds = {**BOUNDS, "position_gain": (0.01, 1.0), "attitude_gain": (0.01, 1.0)}
