@@ -13,10 +13,12 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import jax
 import numpy as np
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from experiments.captures.sampling import draw, geometry, initial_state, judge, motion_of, read_seed, robot
 from experiments.captures.work import read_lines, write_line
@@ -76,7 +78,7 @@ def watched(number: int, noise: float) -> Case:
     start = bare.initial_state
     past = jax.device_get(state_before(true, start, WATCHED))
     camera = Camera().scaled(noise)
-    found = _filtered(true, past, _prior(true, start, number), jax.random.key(number), camera)
+    found = _estimated(true, past, _prior(true, start, number), jax.random.key(number), camera)
     path = GraspPath.create(replace(bare, target=true), "handle")
     return Case(number, true, path, geometry(sample.half), jax.device_get(found))
 
@@ -90,24 +92,13 @@ def _prior(true: Target, state, number: int) -> TargetPrior:
     return replace(wide, inertia_parameters=drawn.inertia_parameters, marker_offset_T=drawn.marker_offset_T)
 
 
-def _filtered(true: Target, past, prior: TargetPrior, key, camera: Camera) -> TargetEstimate:
-    return _filtering(camera)(true, past, prior, key)
-
-
-def _filtering(camera: Camera):
-    if camera not in _PROGRAMS:
-        count = int((WATCHED + WINDOW[1]) * camera.rate)
-
-        def course(true, past, prior, key):
-            motion = target_motion(true, past, WATCHED + WINDOW[1], MOTION_STEPS)
-            states = jax.vmap(motion)(sample_times(camera, count))
-            return filter_target(observe_target(true, states, camera, key), camera, prior).estimate
-
-        _PROGRAMS[camera] = jax.jit(course)
-    return _PROGRAMS[camera]
-
-
-_PROGRAMS: dict = {}
+@partial(jax.jit, static_argnums=4)
+def _estimated(true: Target, past, prior: TargetPrior, key, camera: Camera) -> TargetEstimate:
+    """The filter's estimates after every exposure, from the past state on to the end of the window."""
+    last = WATCHED + WINDOW[1]
+    motion = target_motion(true, past, last, MOTION_STEPS)
+    states = jax.vmap(motion)(sample_times(camera, int(last * camera.rate)))
+    return filter_target(observe_target(true, states, camera, key), camera, prior).estimate
 
 
 def known(case: Case, time: float, camera: Camera) -> Knowledge:
@@ -221,6 +212,9 @@ def draw_page(path: Path, lines: list[dict]) -> None:
             drawn += axis.plot(grid[:14], middle[:14], marker=".", **line_look(index))
     for axis, part in zip(axes, (0, 1), strict=True):
         axis.set(xlabel="before the grasp [s]", ylabel=f"error at the grasp: {WHAT[part]}", yscale="log")
+        axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axis.yaxis.set_minor_formatter(NullFormatter())
         axis.invert_xaxis()
         axis.axhline(
             ConvergenceTolerances().sizes[part] * UNITS[part], color="0.6", linewidth=0.8, linestyle=":"
@@ -243,7 +237,7 @@ def feasible(count: int) -> list[int]:
 def main() -> None:
     """Carry out what is missing, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=50, help="captures with each noise")
+    parser.add_argument("--count", type=int, default=25, help="captures with each noise")
     parser.add_argument("--lines", default="runs/replanning/cases.jsonl")
     parser.add_argument("--out", default="docs/benchmarks/replanning.md")
     arguments = parser.parse_args()

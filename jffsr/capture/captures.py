@@ -285,7 +285,8 @@ def keeping_clear(path: GraspPath, model: ClearanceModel, settings: CaptureSetti
     keep = Clearance(
         model,
         np.asarray(settings.margin + settings.guard),
-        tolerance=np.asarray(settings.guard / MISS),
+        # Without a guard the constraint's own 0.1 mm is left, for rounding.
+        tolerance=np.asarray(max(settings.guard / MISS, Clearance.tolerance)),
         windows=settings.windows,
     )
     return TargetClearance(path, keep)

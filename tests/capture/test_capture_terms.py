@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 import jffsr
+from jffsr.capture.captures import CaptureSettings, keeping_clear
 from jffsr.capture.checks import check_capture
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.terms import BaseDisturbance, ExecutionTime, IndexAtMost, LostManipulability
+from jffsr.objectives.clearance import MISS
 from jffsr.objectives.composite import CompositeIndex
 from jffsr.robots.geometry import BOX, Geometry, Shape
 from jffsr.target.body import Target
@@ -49,6 +51,16 @@ def test_base_disturbance_is_the_weighted_displacement_and_the_sine_of_half_the_
     np.testing.assert_allclose(term.value(None, run), expected, rtol=1e-12)
     limit = IndexAtMost(CompositeIndex((term,)), 1.0)
     np.testing.assert_allclose(limit.inequality(None, run), [expected - 1.0], rtol=1e-12)
+
+
+def test_what_is_verified_of_clearance_is_the_margin_itself():
+    """Planned with the guard on top; where bodies are the margin apart, the constraint is missed by its tolerance."""
+    model = jffsr.ClearanceModel.create(jffsr.load_robot("servicer_7dof"))
+    keep = keeping_clear(None, model, CaptureSettings(margin=0.02, guard=0.003)).keep
+    np.testing.assert_allclose([keep.margin, keep.tolerance], [0.023, 0.03], rtol=1e-12)
+    np.testing.assert_allclose((keep.margin - 0.02) / MISS, keep.tolerance, rtol=1e-12)
+    bare = keeping_clear(None, model, CaptureSettings(margin=0.02, guard=0.0)).keep
+    np.testing.assert_allclose([bare.margin, bare.tolerance], [0.02, 1e-3], rtol=1e-12)
 
 
 def test_execution_time_is_the_time_of_the_last_sample():
