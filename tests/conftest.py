@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import pytest
 
 jax.config.update("jax_enable_x64", True)
 
-from jffsr.compiling import OPTIONS  # noqa: E402
+from jffsr.compiling import OPTIONS, forget  # noqa: E402
 
 # The tests' own programs get the options of the package's: they have to stand here before the first computation. The
 # suite compiles for longer than it computes, so that it leaves out the code generator's optimisations; the heavier
@@ -25,6 +27,9 @@ from motions import robot_from_record  # noqa: E402
 
 from jffsr.robots.loading import list_robots, load_robot  # noqa: E402
 from jffsr.robots.robot import Robot  # noqa: E402
+
+# Bytes of memory above which a worker lets go of compiled programs before the next file.
+KEPT_MEMORY = 2.5e9
 
 DATA = Path(__file__).parent / "data"
 
@@ -54,3 +59,21 @@ def robots() -> dict[str, Robot]:
     found = {name: load_robot(name) for name in list_robots()}
     found["two_arms"] = load_robot(DATA / "robots" / "two_arms.yaml")
     return found
+
+
+@pytest.fixture(scope="module", autouse=True)
+def little_memory() -> Iterator[None]:
+    """Compiled programs are let go of between files, for those of the whole suite take gigabytes a worker."""
+    yield
+    if _resident_memory() > KEPT_MEMORY:
+        forget()
+        gc.collect()
+
+
+def _resident_memory() -> float:
+    """Bytes of memory that this process holds now; zero where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    return pages * float(os.sysconf("SC_PAGE_SIZE"))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import threading
 import time
+import weakref
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import nullcontext
@@ -27,6 +28,7 @@ from jffsr.compiling.options import ONCE, OPTIONS
 _WORKERS = 2
 _workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="jffsr-compile")
 _waited = threading.local()
+_all: weakref.WeakSet[Program] = weakref.WeakSet()
 
 
 def seconds_waited() -> float:
@@ -37,6 +39,17 @@ def seconds_waited() -> float:
 def is_waiting() -> bool:
     """Whether this thread is waiting for a program just now."""
     return getattr(_waited, "depth", 0) > 0
+
+
+def forget() -> None:
+    """Let go of every compiled program, JAX's own too, and of their memory: what is called next compiles anew.
+
+    A process that has gone through many different problems holds the programs of all of them (gigabytes after some
+    hundred). Programs that a thread is compiling just now stay.
+    """
+    for known in list(_all):
+        known.forget()
+    jax.clear_caches()
 
 
 class Program:
@@ -56,6 +69,7 @@ class Program:
         self._compiled: dict[Hashable, Future] = {}
         self._lock = threading.Lock()
         update_wrapper(self, function)
+        _all.add(self)
 
     def __call__(self, *args: Any) -> Any:
         """The function's value."""
@@ -84,6 +98,11 @@ class Program:
             future = _workers.submit(self._obtain_as, args, bool(jax.config.jax_enable_x64), _mesh())
             self._compiled[signature] = future
         return future
+
+    def forget(self) -> None:
+        """Let go of what has been compiled."""
+        with self._lock:
+            self._compiled = {key: future for key, future in self._compiled.items() if not future.done()}
 
     def shape(self, *args: Any) -> Any:
         """Shapes and types of the value, traced at most once for arguments of the same form."""

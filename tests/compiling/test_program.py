@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 
 import chex
 import jax
@@ -10,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jffsr.compiling import Program
+from jffsr.compiling import Program, forget
 from jffsr.compiling.program import is_waiting, seconds_waited
 
 
@@ -104,3 +106,17 @@ def test_traced_arguments_and_other_settings_are_left_to_jax():
         assert program(3.0) == 9.0
     with jax.debug_nans(True), pytest.raises(FloatingPointError), np.errstate(all="ignore"):
         Program(lambda x: x / x)(np.float64(0.0))
+
+
+def test_what_is_forgotten_is_compiled_anew():
+    traces = []
+    program = Program(lambda x: traces.append(None) or 2 * x)
+    results = [program(np.float64(number)) for number in (1.0, 2.0)]
+    assert len(traces) == 1
+    executable = weakref.ref(next(iter(program._compiled.values())).result())
+    forget()
+    gc.collect()
+    assert executable() is None
+    results.append(program(np.float64(3.0)))
+    assert len(traces) == 2
+    np.testing.assert_array_equal(results, [2.0, 4.0, 6.0])
