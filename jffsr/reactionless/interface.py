@@ -35,7 +35,7 @@ class Measured:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class Desired:
-    """Joint motion (n,) to follow at one sample: joint_position, joint_velocity, joint_acceleration, rad or m, per s."""
+    """Joint motion (n,) to follow at a sample: joint_position, joint_velocity, joint_acceleration, rad or m, per s."""
 
     joint_position: Vector
     joint_velocity: Vector
