@@ -31,7 +31,7 @@ def bias_force(robot: Robot, kin: Kinematics, base_twist: Twist, joint_velocity:
     """
     motion, inertia = motion_subspace(robot, kin), spatial_inertias(robot, kin)
     still = -_carried(base_twist)
-    wrench = _wrenches(
+    wrench = body_wrenches(
         robot, kin, inertia, motion, still, base_twist, joint_velocity, jnp.zeros(robot.num_joints)
     )
     carried = inwards(robot.topology.parents, wrench)
@@ -56,7 +56,7 @@ def inverse_dynamics(
     motion, inertia = motion_subspace(robot, kin), spatial_inertias(robot, kin)
     # First with the base's twist constant, then the base's own acceleration is added to every body alike.
     still = -_carried(base_twist)
-    wrench = _wrenches(robot, kin, inertia, motion, still, base_twist, joint_velocity, joint_acceleration)
+    wrench = body_wrenches(robot, kin, inertia, motion, still, base_twist, joint_velocity, joint_acceleration)
     carried, composite = inwards(parents, wrench), inwards(parents, inertia)
     acceleration = _base_reaction(composite[0], carried[0], base_mode)
     carried = carried + composite @ acceleration
@@ -108,7 +108,7 @@ def _carried(base_twist: Twist) -> Twist:
     return jnp.concatenate([jnp.cross(base_twist[3:], base_twist[:3]), jnp.zeros(3)])
 
 
-def _wrenches(
+def body_wrenches(
     robot: Robot,
     kin: Kinematics,
     inertia: Array,
@@ -118,7 +118,10 @@ def _wrenches(
     joint_velocity: Vector,
     joint_acceleration: Vector,
 ) -> Array:
-    """Wrench (b, 6) about O that each body needs; the base's acceleration is the spatial one at O."""
+    """Wrench (b, 6) about O that each body needs, I a + v x* I v; the base's acceleration is the spatial one at O.
+
+    inertia (b, 6, 6) may be any spatial inertias about O: the wrench is linear in them.
+    """
     twist = body_twists(robot, kin, base_twist, joint_velocity)
     coriolis = cross_motion(twist[1:], motion * joint_velocity[:, None])
     steps = motion * joint_acceleration[:, None] + coriolis

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -15,14 +15,11 @@ from jffsr.dynamics.kinematics import kinematics
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.rollout import check_steps
-from jffsr.spatial.rotation import quaternion_multiply
+from jffsr.rollouts.torque_step import filled_state, runge_kutta_step, state_slope
 from jffsr.types import Array, Scalar, Vector
 
 Torque = Callable[[Scalar, State], Vector]
 """Joint torques (n,), N m or N, at a time, s, in a state."""
-
-_REACH = np.array([0.0, 0.5, 0.5, 1.0])
-_WEIGHT = np.array([1.0, 2.0, 2.0, 1.0]) / 6
 
 
 @jax.tree_util.register_dataclass
@@ -86,38 +83,11 @@ def torque_rollout(
         acceleration = forward_dynamics(
             robot, kin, state.base_twist, state.joint_velocity, applied, base_mode
         )
-        spin = jnp.concatenate([jnp.zeros(1), state.base_twist[3:]])
-        return State(
-            base_position=state.base_twist[:3],
-            base_quaternion=0.5 * quaternion_multiply(spin, state.base_quaternion),
-            joint_position=state.joint_velocity,
-            base_twist=acceleration[:6],
-            joint_velocity=acceleration[6:],
-        )
+        return state_slope(state, acceleration)
 
     def advance(state: State, time: Scalar) -> tuple[State, tuple[State, Vector]]:
         now = _asked(torque, time, state)
-
-        # The four stages are one loop, so that the dynamics is compiled once.
-        def stage(carry, inputs):
-            last, total = carry
-            reach, weight = inputs
-            reached = jax.tree.map(lambda x, k: x + reach * step * k, state, last)
-            k = slope(time + reach * step, reached, now)
-            return (k, jax.tree.map(lambda sum_, new: sum_ + weight * new, total, k)), None
-
-        zero = jax.tree.map(jnp.zeros_like, state)
-        (_, total), _ = jax.lax.scan(stage, (zero, zero), (_REACH, _WEIGHT))
-        following = jax.tree.map(lambda x, k: x + step * k, state, total)
-        quaternion = following.base_quaternion / jnp.linalg.norm(following.base_quaternion)
-        following = State(
-            following.base_position,
-            quaternion,
-            following.joint_position,
-            following.base_twist,
-            following.joint_velocity,
-        )
-        return following, (state, now)
+        return runge_kutta_step(lambda t, s: slope(t, s, now), state, time, step), (state, now)
 
     # One step more than asked for: each reports the state that it starts from.
     times = jnp.arange(steps + 1) * step
@@ -145,12 +115,5 @@ def _asked(torque: Torque, time: Scalar, state: State) -> Vector:
 
 def _initial(state: State, num_joints: int, freedom: int) -> State:
     """The state with its velocities filled in, all floating point, and what the base_mode holds at rest."""
-    twist = jnp.zeros(6) if state.base_twist is None else jnp.asarray(state.base_twist, dtype=float)
-    rate = state.joint_velocity
-    return State(
-        base_position=jnp.asarray(state.base_position, dtype=float),
-        base_quaternion=jnp.asarray(state.base_quaternion, dtype=float),
-        joint_position=jnp.asarray(state.joint_position, dtype=float),
-        base_twist=jnp.where(np.arange(6) < freedom, twist, 0.0),
-        joint_velocity=jnp.zeros(num_joints) if rate is None else jnp.asarray(rate, dtype=float),
-    )
+    state = filled_state(state, num_joints)
+    return replace(state, base_twist=jnp.where(np.arange(6) < freedom, state.base_twist, 0.0))

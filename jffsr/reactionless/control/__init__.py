@@ -1,0 +1,1 @@
+"""Controllers of the joints: they know the robot without its load, and what is measured."""
