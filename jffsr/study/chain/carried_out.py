@@ -63,7 +63,7 @@ def carry_out(
     grasp, tool = planned.grasp, study.end_effector
     error = np.asarray(missed_by(study.robot, state, study.target, target_state, grasp, tool))
     chain = Chain(ChainResult(ChainCode.GRASP_MISSED, ""), planned, found, error)
-    wrong = _grasp_refused(config, chain)
+    wrong = grasp_refused(config, chain)
     if wrong is not None:
         return replace(chain, result=wrong)
     compound = compound_of(study.robot, state, study.target, target_state, tool)
@@ -101,7 +101,7 @@ def known_load(study: CaptureStudy, state: State, target_state: TargetState, com
     return KnownLoad(load, np.asarray(compound.momentum[3:]))
 
 
-def _grasp_refused(config: ChainConfig, chain: Chain) -> ChainResult | None:
+def grasp_refused(config: ChainConfig, chain: Chain) -> ChainResult | None:
     """Why there is no grasp: something touched on the way, or the tool is not where the grasp frame is; NaN is not."""
     if chain.approach.contacts:
         first = chain.approach.contacts[0]
