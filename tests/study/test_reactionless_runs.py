@@ -129,3 +129,15 @@ def test_bad_input_is_told_in_one_sentence(config, override, sentence, tmp_path,
     assert not (tmp_path / "run").exists()
     with pytest.raises(jffsr.InputError, match=sentence):
         raise jffsr.InputError(said)
+
+
+@pytest.mark.slow
+def test_mujoco_moves_the_robot_as_the_study_says(finished, capsys):
+    folder, _ = finished
+    assert cli.main(["check", str(folder)]) == cli.MET
+    assert "says the same of every run" in capsys.readouterr().out
+    found = json.loads((folder / "summary.json").read_text())["verification"]["mujoco"]
+    assert found["passed"]
+    for run in found["runs"].values():
+        assert 0 < run["attitude"] < 1e-5
+        assert run["momentum"] < 1e-3

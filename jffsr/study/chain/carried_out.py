@@ -68,14 +68,7 @@ def carry_out(
         return replace(chain, result=wrong)
     compound = compound_of(study.robot, state, study.target, target_state, tool)
     say(f"grasped; {np.linalg.norm(compound.momentum[3:]):.3g} N m s of angular momentum to be taken up")
-    (held,) = hold_still(
-        config.hold,
-        study.robot,
-        compound.robot,
-        compound.state,
-        known_load(study, state, target_state, compound),
-        tool,
-    )
+    held = hold_of(config, study, compound, known_load(study, state, target_state, compound))
     code = ChainCode.HELD if held.success else ChainCode.NOT_HELD
     text = (
         f"The target is grasped and {held.sentence}."
@@ -83,6 +76,23 @@ def carry_out(
         else f"The target is grasped, but {held.sentence}."
     )
     return replace(chain, result=ChainResult(code, text), compound=compound, held=held)
+
+
+def hold_of(
+    config: ChainConfig, study: CaptureStudy, compound: Compound, known: KnownLoad, in_mujoco: bool = False
+) -> Held:
+    """The base held still by the robot, which has the target in hand."""
+    (held,) = hold_still(
+        config.hold,
+        study.robot,
+        compound.robot,
+        compound.state,
+        known,
+        study.end_effector,
+        where=config.where("hold"),
+        in_mujoco=in_mujoco,
+    )
+    return held
 
 
 def known_load(study: CaptureStudy, state: State, target_state: TargetState, compound: Compound) -> KnownLoad:

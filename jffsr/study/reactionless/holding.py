@@ -24,6 +24,7 @@ from jffsr.reactionless.estimation.models import KnownLoad, LoadModel, Regressed
 from jffsr.reactionless.estimation.parameters import LoadParameters
 from jffsr.reactionless.interface import Controller
 from jffsr.reactionless.plant import closed_loop
+from jffsr.reactionless.plant_mujoco import closed_loop_mujoco
 from jffsr.reactionless.plant_run import LoopCode, LoopRun, loop_sentence
 from jffsr.reactionless.plant_settings import JointDisturbance, LoopSettings, Sensors, Strike
 from jffsr.robots.robot import Robot
@@ -80,12 +81,13 @@ def hold_still(
     seeds: int = 1,
     strike: Strike | None = None,
     where: str = "hold",
+    in_mujoco: bool = False,
 ) -> tuple[Held, ...]:
     """Run the hold with so many seeds of noise and disturbance, from hold.seed on.
 
     `whole` is the plant, robot and load as one, in `state`; the robot alone is what is known of it. known is what the
-    estimator "known" is told, and no other; strike, a blow from outside. where: of the section, for the sentences of
-    InputError.
+    estimator "known" is told, and no other; strike, a blow from outside. With in_mujoco MuJoCo moves the plant, under
+    the same noise. where: of the section, for the sentences of InputError.
     """
     n, limits, free = robot.num_joints, robot.limits, np.full(robot.num_joints, np.inf)
     excitation = hold.excitation
@@ -102,6 +104,9 @@ def hold_still(
     controller = build_controller(hold, robot, state, where)
     settings = replace(loop_settings(hold, robot), strike=strike)
     keys = jnp.stack([jax.random.key(hold.seed + k) for k in range(seeds)])
+    if in_mujoco:
+        loops = [closed_loop_mujoco(whole, state, reference, controller, settings, key) for key in keys]
+        return tuple(_judged(hold, robot, jax.device_get(run)) for run in loops)
     runs = jax.device_get(_runs(whole, state, reference, controller, settings, keys))
     return tuple(_judged(hold, robot, jax.tree.map(lambda x, k=k: x[k], runs)) for k in range(seeds))
 

@@ -14,6 +14,7 @@ from jffsr.study.reactionless.building import ReactionlessStudy, build_study
 from jffsr.study.reactionless.dataset import runs_dataset
 from jffsr.study.reactionless.holding import Held, hold_still
 from jffsr.study.reactionless.schema import ReactionlessConfig
+from jffsr.study.reactionless.schema_hold import Hold
 from jffsr.study.reactionless.summary import reactionless_summary, run_summary
 
 
@@ -33,7 +34,7 @@ def run_reactionless(
     runs: dict[str, tuple[Held, ...]] = {}
     with Stopwatch() as watch:
         for name, hold in config.holds.items():
-            runs[name] = run_hold(config, study, hold)
+            runs[name] = run_hold(config, study, hold, config.seeds)
             found = run_summary(hold, runs[name])
             told(f"{name}: {found['sentence']}")
             if is_first():
@@ -44,8 +45,10 @@ def run_reactionless(
     return Run(folder, shared_summary(folder))
 
 
-def run_hold(config: ReactionlessConfig, study: ReactionlessStudy, hold) -> tuple[Held, ...]:
-    """All seeds of one run."""
+def run_hold(
+    config: ReactionlessConfig, study: ReactionlessStudy, hold: Hold, seeds: int = 1, in_mujoco: bool = False
+) -> tuple[Held, ...]:
+    """So many seeds of one run."""
     return hold_still(
         hold,
         study.robot,
@@ -53,7 +56,8 @@ def run_hold(config: ReactionlessConfig, study: ReactionlessStudy, hold) -> tupl
         study.compound.state,
         study.known,
         study.end_effector,
-        seeds=config.seeds,
+        seeds=seeds,
         strike=study.strike,
         where=config.where("hold"),
+        in_mujoco=in_mujoco,
     )
