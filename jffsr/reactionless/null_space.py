@@ -51,8 +51,8 @@ class ReactionCode(IntEnum):
 SENTENCES = {
     ReactionCode.HELD: "the base stands still about the chosen axes",
     ReactionCode.NOT_ABSORBED: (
-        "the joints cannot take up this momentum in this posture: the coupling matrix lacks the rank for it, and the base "
-        "turns at the rate reported; ask for fewer axes, or leave the posture"
+        "the joints cannot take up this momentum in this posture: the coupling matrix lacks the rank for it, "
+        "and the base turns at the rate reported; ask for fewer axes, or leave the posture"
     ),
     ReactionCode.NOT_FINITE: "the rates are not finite: the state, the momentum or a wanted rate is not",
 }
@@ -63,9 +63,9 @@ SENTENCES = {
 class ReactionlessRates:
     """Joint rates that hold the base's attitude, and what is left to say of them.
 
-    joint_velocity (n,), rad/s or m/s; base_twist (6,), [linear; angular] in I, by the momentum equation; space (n, n), the
-    projector on the rates that are still free; rank (), int, of the rows asked for; singular_values (k,), largest first;
-    code (), int32, of `ReactionCode`, its sentence in `SENTENCES`.
+    joint_velocity (n,), rad/s or m/s; base_twist (6,), [linear; angular] in I, by the momentum equation; space (n,
+    n), the projector on the rates that are still free; rank (), int, of the rows asked for; singular_values (k,),
+    largest first; code (), int32, of `ReactionCode`, its sentence in `SENTENCES`.
     """
 
     joint_velocity: Vector
@@ -89,7 +89,8 @@ def absorbing(
     """Least-norm rates (n,) with coupling (k, n) @ rates = wanted (k,), the null space's projector (n, n), and the
     singular values (min(k, n),), largest first.
 
-    Where there are none, those that come nearest. Singular values below `cut` of the largest count as zero. Derivatives are finite also at repeated singular values.
+    Where there are none, those that come nearest. Singular values below `cut` of the largest count as zero.
+    Derivatives are finite also at repeated singular values.
     """
     inverse, sigma = inverse_and_values(coupling, constant(0.0), cut)
     return inverse @ wanted, jnp.eye(coupling.shape[1]) - inverse @ coupling, sigma
@@ -111,10 +112,10 @@ def reactionless_rates(
 ) -> ReactionlessRates:
     """Rates that keep chosen axes of the base still under a momentum, and do what is asked in what freedom is left.
 
-    momentum (6,) is P, then L about the system's centre of mass, in I, None zero; axes (static) are those of B that must
-    not turn. tool_velocity, (3,) m/s or (6,) with rad/s, in I, is followed as closely as the null space allows;
-    null_rate (n,) is projected on what that leaves (Ye 2019, eq. 20, for zeta). For joint limits give
-    -gain * `jffsr.tracking.redundancy.limit_gradient`. Raises InputError for axes that are none.
+    momentum (6,) is P, then L about the system's centre of mass, in I, None zero; axes (static) are those of B that
+    must not turn. tool_velocity, (3,) m/s or (6,) with rad/s, in I, is followed as closely as the null space allows;
+    null_rate (n,) is projected on what that leaves (Ye 2019, eq. 20, for zeta). For joint limits give -gain *
+    `jffsr.tracking.redundancy.limit_gradient`. Raises InputError for axes that are none.
     """
     axes = checked_axes(axes)
     momentum = jnp.zeros(6) if momentum is None else jnp.asarray(momentum)
@@ -122,7 +123,9 @@ def reactionless_rates(
     task, wanted = attitude_task(kin.rotation[0], locked, coupling, momentum[3:], axes)
     rates, space, sigma = absorbing(task, wanted)
     if tool_velocity is not None:
-        rates, space = _with_tool(robot, kin, momentum, rates, space, jnp.asarray(tool_velocity), end_effector)
+        rates, space = _with_tool(
+            robot, kin, momentum, rates, space, jnp.asarray(tool_velocity), end_effector
+        )
     if null_rate is not None:
         rates = rates + space @ null_rate
     twist = base_twist(robot, kin, rates, momentum)
@@ -133,7 +136,7 @@ def reactionless_rates(
 
 
 def result_code(turning: Array, drift: Vector3, rates: Vector) -> Scalar:
-    """Code () of rates whose base turns by `turning`, rad/s, about the axes held; drift (3,): with the joints locked."""
+    """Code () of rates whose base turns by `turning`, rad/s, about the axes held; drift (3,): with joints locked."""
     still = safe_norm(turning) <= _STILL_SHARE * safe_norm(drift) + _STILL_RATE
     code = jnp.where(still, ReactionCode.HELD, ReactionCode.NOT_ABSORBED)
     return jnp.where(jnp.all(jnp.isfinite(rates)), code, ReactionCode.NOT_FINITE).astype(jnp.int32)

@@ -30,9 +30,7 @@ RANK_CUT = 1e-12
 
 
 @jax.custom_jvp
-def inverse_and_values(
-    jacobian: Matrix, damping: Damping, cut: float = RANK_CUT
-) -> tuple[Matrix, Vector]:
+def inverse_and_values(jacobian: Matrix, damping: Damping, cut: float = RANK_CUT) -> tuple[Matrix, Vector]:
     """`filtered_inverse` and `singular_values` of a matrix (m, n) by one decomposition."""
     u, sigma, v = singular_bases(jacobian)
     kept = _kept(sigma, damping, cut)
@@ -43,8 +41,9 @@ def inverse_and_values(
 def filtered_inverse(jacobian: Matrix, damping: Damping, cut: float = RANK_CUT) -> Matrix:
     """V g(Sigma) U' (n, m) of a matrix (m, n), with g(s) = s/(s^2 + lambda(s)^2), zero for undamped zero values.
 
-    Undamped values below `cut` of the largest count as zero. Without damping it is the Moore-Penrose inverse. Its derivative is right and finite at repeated singular values
-    and, where there is damping, at zero ones; first derivatives only.
+    Undamped values below `cut` of the largest count as zero. Without damping it is the Moore-Penrose inverse. Its
+    derivative is right and finite at repeated singular values and, where there is damping, at zero ones; first
+    derivatives only.
     """
     return inverse_and_values(jacobian, damping, cut)[0]
 

@@ -30,7 +30,12 @@ def case():
         ROBOT, jffsr.RigidBody(60.0, np.zeros(3), INERTIA), position=LOAD.com, quaternion=(1, 0, 0, 0)
     )
     measured = Measured(
-        state.base_quaternion, state.base_twist[3:], np.zeros(6), state.joint_position, state.joint_velocity, True
+        state.base_quaternion,
+        state.base_twist[3:],
+        np.zeros(6),
+        state.joint_position,
+        state.joint_velocity,
+        True,
     )
 
     @jax.jit

@@ -46,8 +46,9 @@ def run(estimator, regressors, values, fresh=None):
 def ridge(regressors, values, weights, variance=1.0):
     """Batch: the sum of w |y - W' phi|^2/variance, and |W|^2/Q(0), least."""
     information = (regressors * weights[:, None]).T @ regressors / variance
-    prior = np.prod(np.ones(1)) * np.eye(SIZE) / 1.4
-    return np.linalg.solve(information + prior, (regressors * weights[:, None]).T @ values / variance)
+    return np.linalg.solve(
+        information + np.eye(SIZE) / 1.4, (regressors * weights[:, None]).T @ values / variance
+    )
 
 
 def test_plain_is_the_batch_solution():
@@ -128,16 +129,22 @@ def test_innovation_forgets_only_when_surprised():
 
 
 def test_after_a_jump_those_that_forget_come_back():
-    truth, regressors, values = samples(600)
-    values = regressors @ np.where(np.arange(600)[:, None, None] < 300, truth, -truth)
-    values = values[np.arange(600), np.arange(600)] if values.ndim == 3 else values
+    """Whoever forgets 0.01 a sample keeps e^-3 of the jump after 300; the direction alone, four times slower."""
+    truth, regressors, _ = samples(600)
+    signs = np.where(np.arange(600) < 300, 1.0, -1.0)
+    values = signs[:, None] * (regressors @ truth)
     off = {}
-    forgetful = {**BOUNDED, "innovation": RecursiveLeastSquares(InnovationForgetting(variance=1e-2))}
-    for name, estimator in forgetful.items():
+    for name, estimator in {
+        **BOUNDED,
+        "innovation": RecursiveLeastSquares(InnovationForgetting(variance=1e-2)),
+    }.items():
         known, _ = run(estimator, regressors, values)
         off[name] = float(np.abs(np.asarray(known.weights) + truth).max())
-    assert off["plain"] > 0.3
-    assert all(off[name] < 0.1 for name in off if name != "plain"), off
+    assert off["plain"] > 1.0
+    assert off["innovation"] < 0.02
+    assert off["window"] < 1e-3
+    assert off["clock"] < 0.15
+    assert off["directional"] < 0.7 * off["plain"]
 
 
 @pytest.mark.parametrize("name", list(BOUNDED))

@@ -1,4 +1,4 @@
-"""The reaction null space: blocks against the momentum, published anchors, priorities, axes, and what cannot be held."""
+"""The reaction null space: blocks against the momentum, published anchors, priorities, axes, what cannot be held."""
 
 from __future__ import annotations
 

@@ -61,13 +61,14 @@ class AdaptiveState:
 class AdaptiveReactionless:
     """A `Reference`: qd = H# (L + gain H_w e) + s (1 - H# H) zeta(t), with the blocks that the model estimates.
 
-    robot: without its load; model: learns the load; period, s, of the samples; null_rate: zeta (n,), rad/s, at a time, None
-    for none. rate_limit (n,) or scalar, rad/s: s is the largest share in [0, 1] of the null motion that keeps it, and if the
-    rest exceeds it alone, that is scaled down and the state says so. acceleration_limit, rad/s^2: how fast commanded rates
-    may change. attitude_gain, 1/s: feeds back the base's rotation e since the start. rank_cut: singular values of the
-    estimated coupling below that share of the largest are taken for errors of the estimate. axes, static: those of B to hold;
-    a planar arm can hold only the one it turns about, and what noise makes of the others is not to be answered. learn,
-    static: false keeps the model as it begins. end_effector, static: what carries the load, None the first.
+    robot: without its load; model: learns the load; period, s, of the samples; null_rate: zeta (n,), rad/s, at a
+    time, None for none. rate_limit (n,) or scalar, rad/s: s is the largest share in [0, 1] of the null motion that
+    keeps it, and if the rest exceeds it alone, that is scaled down and the state says so. acceleration_limit,
+    rad/s^2: how fast commanded rates may change. attitude_gain, 1/s: feeds back the base's rotation e since the
+    start. rank_cut: singular values of the estimated coupling below that share of the largest are taken for errors
+    of the estimate. axes, static: those of B to hold; a planar arm can hold only the one it turns about, and what
+    noise makes of the others is not to be answered. learn, static: false keeps the model as it begins. end_effector,
+    static: what carries the load, None the first.
     """
 
     robot: Robot
@@ -95,7 +96,9 @@ class AdaptiveReactionless:
             none,
         )
 
-    def advance(self, state: AdaptiveState, time: Scalar, measured: Measured) -> tuple[AdaptiveState, Desired]:
+    def advance(
+        self, state: AdaptiveState, time: Scalar, measured: Measured
+    ) -> tuple[AdaptiveState, Desired]:
         """Learn from the sample, and command the rates until the next."""
         # Without a measurement the joints are where they were told to be, rather than where they were last seen.
         there = jnp.asarray(measured.fresh) & jnp.all(jnp.isfinite(measured.joint_position))

@@ -32,10 +32,10 @@ from jffsr.types import Array, Matrix, Matrix3, Scalar, Vector, Vector3
 class Balance:
     """The robot without its load at one sample, resolved in B.
 
-    rotation (3, 3), B to I; base_rate (3,), rad/s; joint_velocity (n,); locked (3, 3) and coupling (3, n), kg m^2, about
-    the robot's own centre of mass; lever (3,), m, from there to the tool; tool_rotation (3, 3), E to B; lever_jacobian and
-    spin_jacobian (3, n), the tool's velocity relative to that centre and its angular velocity per joint rate; robot_mass
-    (), kg; usable (), bool: fresh, and all of it finite.
+    rotation (3, 3), B to I; base_rate (3,), rad/s; joint_velocity (n,); locked (3, 3) and coupling (3, n), kg m^2,
+    about the robot's own centre of mass; lever (3,), m, from there to the tool; tool_rotation (3, 3), E to B;
+    lever_jacobian and spin_jacobian (3, n), the tool's velocity relative to that centre and its angular velocity per
+    joint rate; robot_mass (), kg; usable (), bool: fresh, and all of it finite.
     """
 
     rotation: Matrix3

@@ -6,16 +6,20 @@ the true load, and the reference sees the base's rate and the joints through noi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from jffsr.reactionless.estimation.balance import Balance, Load, balance_of, load_blocks
+from jffsr.reactionless.estimation.balance import Load, balance_of, load_blocks
 from jffsr.reactionless.interface import Measured, Reference
 from jffsr.robots.robot import Robot
-from jffsr.spatial.rotation import quaternion_multiply, rotation_vector_to_quaternion
+from jffsr.spatial.rotation import (
+    quaternion_multiply,
+    quaternion_to_matrix,
+    rotation_vector_to_quaternion,
+)
 from jffsr.types import Array, Quaternion, Scalar, Vector, Vector3
 
 
@@ -32,8 +36,8 @@ class SensorNoise:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
-    """Two loads in the tool frame, the second from time `change`, s, on; angular_momentum (3,), N m s, in I, of robot and
-    first load.
+    """Two loads in the tool frame, the second from time `change`, s, on; angular_momentum (3,), N m s, in I, of
+    robot and first load.
 
     The second one docks without a jolt: velocities go on, and the momentum is that of the new whole.
     """
@@ -80,54 +84,57 @@ def commanded_run(
     lost = jnp.zeros(num_samples, dtype=bool) if lost is None else jnp.asarray(lost)
     upright = jnp.array([1.0, 0.0, 0.0, 0.0])
 
-    def seen(quaternion: Quaternion, q: Vector, rates: Vector) -> Balance:
-        still = Measured(quaternion, jnp.zeros(3), jnp.zeros(6), q, rates, jnp.array(True))
-        return balance_of(robot, still, end_effector)
-
-    def whole(balance: Balance, changed: Scalar) -> tuple[Array, Array]:
+    def blocks(q: Vector, changed: Scalar) -> tuple[Array, Array]:
+        """H_w (3, 3) and H_wphi (3, n) of robot and load, in B."""
+        zeros = jnp.zeros_like(q)
+        still = Measured(upright, jnp.zeros(3), jnp.zeros(6), q, zeros, jnp.array(True))
+        balance = balance_of(robot, still, end_effector)
         load = jax.tree.map(lambda a, b: jnp.where(changed, b, a), history.first, history.second)
         locked, coupling = load_blocks(balance, load)
         return balance.locked + locked, balance.coupling + coupling
 
-    def rate_of(balance: Balance, rates: Vector, momentum: Vector3, changed: Scalar) -> Vector3:
-        locked, coupling = whole(balance, changed)
-        return jnp.linalg.solve(locked, balance.rotation.T @ momentum - coupling @ rates)
+    def rate_of(quaternion: Quaternion, at: tuple[Array, Array], rates: Vector, momentum: Vector3) -> Vector3:
+        locked, coupling = at
+        turned = quaternion_to_matrix(quaternion).T @ momentum
+        return jnp.linalg.solve(locked, turned - coupling @ rates)
 
     def measure(quaternion, q, rates, rate, key, fresh, last: Measured) -> Measured:
         a, b, c = jax.random.split(key, 3)
-        balance_rate = rate + noise.base_rate * jax.random.normal(a, (3,))
+        seen = rate + noise.base_rate * jax.random.normal(a, (3,))
         new = Measured(
             quaternion,
-            seen(quaternion, q, rates).rotation @ balance_rate,
+            quaternion_to_matrix(quaternion) @ seen,
             jnp.zeros(6),
             q + noise.joint_position * jax.random.normal(b, q.shape),
             rates + noise.joint_rate * jax.random.normal(c, q.shape),
             fresh,
         )
         kept = jax.tree.map(lambda x, y: jnp.where(fresh, x, y), new, last)
-        return Measured(*(getattr(kept, name) for name in _MEASURED), fresh=fresh)
+        return replace(kept, fresh=fresh)
 
     def sample(carry, inputs):
         quaternion, q, rates, rate, momentum, state, last = carry
         time, key, gone = inputs
         changed = time >= history.change
-        before = seen(quaternion, q, rates)
-        locked, coupling = whole(before, changed)
-        docking = changed & (time - period < history.change)
-        momentum = jnp.where(docking, before.rotation @ (locked @ rate + coupling @ rates), momentum)
         measured = measure(quaternion, q, rates, rate, key, ~gone, last)
         state, desired = reference.advance(state, time, measured)
-        rates = desired.joint_velocity
+        commanded = desired.joint_velocity
+        # In B the blocks depend on the joints alone, which are known for the whole sample.
+        path = q + jnp.array([[0.0], [0.5], [1.0]]) * period * commanded
+        now, halfway, end = _unstacked(jax.vmap(blocks, (0, None))(path, changed))
+        docking = changed & (time - period < history.change)
+        whole = quaternion_to_matrix(quaternion) @ (now[0] @ rate + now[1] @ rates)
+        momentum = jnp.where(docking, whole, momentum)
         # The midpoint rule, for rates that stay as they are over the sample.
-        halfway = seen(_turned(quaternion, rate_of(before, rates, momentum, changed), period / 2), q + rates * period / 2, rates)
-        quaternion = _turned(quaternion, rate_of(halfway, rates, momentum, changed), period)
-        q = q + rates * period
-        rate = rate_of(seen(quaternion, q, rates), rates, momentum, changed)
-        return (quaternion, q, rates, rate, momentum, state, measured), (rate, quaternion, q, rates, state)
+        middle = _turned(quaternion, rate_of(quaternion, now, commanded, momentum), period / 2)
+        quaternion = _turned(quaternion, rate_of(middle, halfway, commanded, momentum), period)
+        rate = rate_of(quaternion, end, commanded, momentum)
+        following = quaternion, path[2], commanded, rate, momentum, state, measured
+        return following, (rate, quaternion, path[2], commanded, state)
 
     momentum = jnp.asarray(history.angular_momentum, dtype=float)
     q, rates = jnp.asarray(joint_position, dtype=float), jnp.asarray(joint_velocity, dtype=float)
-    rate = rate_of(seen(upright, q, rates), rates, momentum, jnp.array(False))
+    rate = rate_of(upright, blocks(q, jnp.array(False)), rates, momentum)
     first = Measured(upright, rate, jnp.zeros(6), q, rates, jnp.array(True))
     times = jnp.arange(num_samples) * period
     start = (upright, q, rates, rate, momentum, reference.begin(first), first)
@@ -135,7 +142,8 @@ def commanded_run(
     return CommandedRun(times + period, base_rate, quaternion, position, velocity, states)
 
 
-_MEASURED = ("base_quaternion", "base_rate", "base_acceleration", "joint_position", "joint_velocity")
+def _unstacked(pair: tuple[Array, Array]) -> list[tuple[Array, Array]]:
+    return list(zip(*pair, strict=True))
 
 
 def _turned(quaternion: Quaternion, rate: Vector3, time: Array | float) -> Quaternion:

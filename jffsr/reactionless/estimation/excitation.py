@@ -15,7 +15,8 @@ _GOLDEN = 0.6180339887498949
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class SineSum:
-    """zeta_j(t) = amplitude sum_k sin(2 pi f_jk t + phase_jk)/K: frequency and phase (n, K), Hz and rad; amplitude, rad/s."""
+    """zeta_j(t) = amplitude sum_k sin(2 pi f_jk t + phase_jk)/K: frequency and phase (n, K), Hz and rad; amplitude,
+    rad/s."""
 
     amplitude: Array | float
     frequency: Array
@@ -38,6 +39,4 @@ class SineSum:
 
     def __call__(self, time: Scalar) -> Vector:
         """zeta (n,), rad/s, at a time, s."""
-        return self.amplitude * jnp.mean(
-            jnp.sin(2 * jnp.pi * self.frequency * time + self.phase), axis=-1
-        )
+        return self.amplitude * jnp.mean(jnp.sin(2 * jnp.pi * self.frequency * time + self.phase), axis=-1)

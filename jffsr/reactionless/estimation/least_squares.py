@@ -1,10 +1,11 @@
 """Recursive least squares with forgetting, and over a sliding window: W of value = W' regressor.
 
 N = Q phi/(lambda r + phi' Q phi), Q <- (1 - N phi') Q/lambda, W <- W + N (y - W' phi)' (Ye, Dong and Hong 2019, as
-corrected), with r the variance of the noise: forgetting Q <- Q/lambda, then the sample. Where nothing excites a direction,
-that lets Q grow without bound. Here as much information is put back, in every direction alike, as keeps Q within a bound
-(after Salgado, Goodwin and Middleton 1988); to scale Q down as a whole instead would let the directions that nothing
-excites drown the others. Or only what the regressor brings anew is forgotten (Cao and Schwartz 2000).
+corrected), with r the variance of the noise: forgetting Q <- Q/lambda, then the sample. Where nothing excites a
+direction, that lets Q grow without bound. Here as much information is put back, in every direction alike, as keeps Q
+within a bound (after Salgado, Goodwin and Middleton 1988); to scale Q down as a whole instead would let the
+directions that nothing excites drown the others. Or only what the regressor brings anew is forgotten (Cao and
+Schwartz 2000).
 """
 
 from __future__ import annotations
@@ -50,9 +51,9 @@ class Estimator(Protocol):
 class RecursiveLeastSquares:
     """Recursive least squares with a law of forgetting.
 
-    initial: Q(0) is that times the unit matrix; variance, r, of the values' noise. largest: no eigenvalue of Q exceeds that
-    multiple of Q(0)'s, so that its trace is bounded; infinite leaves Q to itself, as published. directional, static: only
-    the direction of the regressor is forgotten.
+    initial: Q(0) is that times the unit matrix; variance, r, of the values' noise. largest: no eigenvalue of Q
+    exceeds that multiple of Q(0)'s, so that its trace is bounded; infinite leaves Q to itself, as published.
+    directional, static: only the direction of the regressor is forgotten.
     """
 
     forgetting: Forgetting = field(default_factory=ConstantForgetting)

@@ -1,4 +1,5 @@
-"""What a reference needs to know of the whole: its blocks and momentum, known, regressed, or by the load's parameters."""
+"""What a reference needs to know of the whole: its blocks and momentum, known, regressed, or by the load's
+parameters."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class LoadModel(Protocol):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class KnownLoad:
-    """A load (in the tool frame) and an angular momentum (3,), N m s, in I, that are known: what others are measured by."""
+    """A load (in the tool frame) and an angular momentum (3,), N m s, in I, that are known: what others are measured
+    by."""
 
     load: Load
     angular_momentum: Vector3

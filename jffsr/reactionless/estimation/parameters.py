@@ -1,14 +1,16 @@
 """The load's own mass, centre of mass and inertia, and the momentum, from the momentum balance.
 
-They are constant where the regressed matrix changes with every posture, so that nothing need be forgotten until the load
-itself changes. The balance is linear in the load's reduced moments (`reduced_moments`): information on them is summed up
-exactly, and a step of Gauss and Newton per sample fits to it the ten numbers that only rigid bodies have
-(`pseudo_inertia`) and L in I. Nothing is lost by having been linearised where the estimate once was, which makes extended
-Kalman filters overconfident here. A detector on the innovation lets go of the past where the load has become another.
+They are constant where the regressed matrix changes with every posture, so that nothing need be forgotten until the
+load itself changes. The balance is linear in the load's reduced moments (`reduced_moments`): information on them is
+summed up exactly, and a step of Gauss and Newton per sample fits to it the ten numbers that only rigid bodies have
+(`pseudo_inertia`) and L in I. Nothing is lost by having been linearised where the estimate once was, which makes
+extended Kalman filters overconfident here. A detector on the innovation lets go of the past where the load has
+become another.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import jax
@@ -31,11 +33,11 @@ _GUESS = Load(1.0, np.zeros(3), np.diag([0.2, 0.2, 0.2]))
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, eq=False)
 class LoadEstimate:
-    """numbers (13,): the ten of the load in E and L in I, N m s; centre (13,): those it is drawn to with the weight of the
-    first covariance; smoothed (3, 14): regressor and value, low-passed; information (13, 13) and pull (13,): what they tell of
-    [reduced moments; L]; covariance (13, 13), of the
-    numbers; innovation (3,), N m s, of the last sample used; surprise (), the running mean of its square over what it
-    should be; waited (), samples since the past was let go; count (), samples used; openings (), how often it was."""
+    """numbers (13,): the ten of the load in E and L in I, N m s; centre (13,): those it is drawn to with the weight
+    of the first covariance; smoothed (3, 14): regressor and value, low-passed; information (13, 13) and pull (13,):
+    what they tell of [reduced moments; L]; damping (), of the fit; covariance (13, 13), of the numbers; innovation
+    (3,), N m s, of the last sample used; surprise (), the running mean of its square over what it should be; waited
+    (), samples since the past was let go; count (), samples used; openings (), how often it was."""
 
     numbers: Vector
     centre: Vector
@@ -67,12 +69,13 @@ class LoadParameters:
     """Estimates a load's parameters directly.
 
     guess: the load assumed first, in E; initial: the covariance starts as that times the unit matrix; base_rate_noise,
-    rad/s, and joint_rate_noise, rad/s: the sensors' deviations, which set the weight of a sample; least_noise, N m s, is
-    added to them. threshold: the past is let go where the mean over `memory` samples of the squared innovation exceeds so
-    many times its expected value, but not within `patience` samples of the last time. largest_step: bound of one
-    sample's change of any of the load's numbers. smoothing: share of a new sample in the low-passed ones, from which the
-    information comes. A base that is held still shows little but noise, in the regressor as in the value, and least
-    squares would explain it by a whole without inertia; the balance is linear, so that it holds for low-passed samples too.
+    rad/s, and joint_rate_noise, rad/s: the sensors' deviations, which set the weight of a sample; least_noise, N m
+    s, is added to them. threshold: the past is let go where the mean over `memory` samples of the squared innovation
+    exceeds so many times its expected value, but not within `patience` samples of the last time. largest_step: bound
+    of one sample's change of any of the load's numbers. smoothing: share of a new sample in the low-passed ones,
+    from which the information comes. A base that is held still shows little but noise, in the regressor as in the
+    value, and least squares would explain it by a whole without inertia; the balance is linear, so that it holds for
+    low-passed samples too. steps, static: of the fit at each sample.
     """
 
     guess: Load = field(default_factory=lambda: _GUESS)
@@ -85,6 +88,7 @@ class LoadParameters:
     patience: Array | float = 100.0
     largest_step: Array | float = 0.3
     smoothing: Array | float = 0.05
+    steps: int = field(default=2, metadata={"static": True})
 
     def begin(self, balance: Balance) -> LoadEstimate:
         """The guess, and no momentum."""
@@ -119,8 +123,10 @@ class LoadParameters:
         seen = regressor @ slope
         expected = seen @ state.covariance @ seen.T + noise
         squared = innovation @ jnp.linalg.solve(expected, innovation) / 3
-        surprise = state.surprise + (squared - state.surprise) / self.memory
-        reopened = (surprise > self.threshold) & (state.waited >= self.patience)
+        # An estimate that is still settling is surprised by itself.
+        settled = state.waited >= self.patience
+        surprise = jnp.where(settled, state.surprise + (squared - state.surprise) / self.memory, 1.0)
+        reopened = surprise > self.threshold
 
         sample = jnp.concatenate([regressor, value[:, None]], axis=1)
         share = jnp.where(reopened | (state.count == 0), 1.0, self.smoothing)
@@ -130,22 +136,10 @@ class LoadParameters:
         information = jnp.where(reopened, 0.0, state.information) + weighed[:, :-1]
         pull = jnp.where(reopened, 0.0, state.pull) + weighed[:, -1]
         centre = jnp.where(reopened, state.numbers, state.centre)
-        curvature = slope.T @ information @ slope + jnp.eye(now.size) / self.initial
-        downhill = slope.T @ (pull - information @ now) + (centre - state.numbers) / self.initial
+        numbers, damping, curvature = self._fitted(moments, state, centre, information, pull)
         covariance = jnp.linalg.inv(0.5 * (curvature + curvature.T))
-        scaled = state.damping * jnp.diagonal(curvature)
-        change = jnp.linalg.solve(curvature + jnp.diag(scaled), downhill)
-        largest = jnp.max(jnp.abs(change[:NUM_PARAMETERS]))
-        tried = state.numbers + change * jnp.minimum(1.0, self.largest_step / jnp.maximum(largest, 1e-300))
-
-        def cost(numbers: Vector) -> Scalar:
-            x, away = moments(numbers), numbers - centre
-            return 0.5 * x @ information @ x - pull @ x + 0.5 * away @ away / self.initial
-
-        better = cost(tried) <= cost(state.numbers)
-        damping = jnp.clip(jnp.where(better, state.damping / 3, state.damping * 4), 1e-9, 1e9)
         found = LoadEstimate(
-            numbers=jnp.where(better, tried, state.numbers),
+            numbers=numbers,
             damping=damping,
             centre=centre,
             smoothed=smoothed,
@@ -160,6 +154,36 @@ class LoadParameters:
         )
         good = balance.usable & jnp.all(jnp.isfinite(found.numbers)) & jnp.all(jnp.isfinite(found.covariance))
         return jax.tree.map(lambda new, old: jnp.where(good, new, old), found, state)
+
+    def _fitted(
+        self,
+        moments: Callable[[Vector], Vector],
+        state: LoadEstimate,
+        centre: Vector,
+        information: Matrix,
+        pull: Vector,
+    ) -> tuple[Vector, Scalar, Matrix]:
+        """Numbers (13,), damping and curvature (13, 13) after steps of Levenberg and Marquardt; none that is worse
+        counts."""
+
+        def cost(numbers: Vector) -> Scalar:
+            x, away = moments(numbers), numbers - centre
+            return 0.5 * x @ information @ x - pull @ x + 0.5 * away @ away / self.initial
+
+        def step(carry, _):
+            numbers, damping, _ = carry
+            now, slope = moments(numbers), jax.jacfwd(moments)(numbers)
+            curvature = slope.T @ information @ slope + jnp.eye(now.size) / self.initial
+            downhill = slope.T @ (pull - information @ now) + (centre - numbers) / self.initial
+            change = jnp.linalg.solve(curvature + damping * jnp.diag(jnp.diagonal(curvature)), downhill)
+            largest = jnp.max(jnp.abs(change[:NUM_PARAMETERS]))
+            tried = numbers + change * jnp.minimum(1.0, self.largest_step / jnp.maximum(largest, 1e-300))
+            better = cost(tried) <= cost(numbers)
+            damping = jnp.clip(jnp.where(better, damping / 3, damping * 4), 1e-9, 1e9)
+            return (jnp.where(better, tried, numbers), damping, curvature), None
+
+        start = state.numbers, state.damping, jnp.zeros_like(information)
+        return jax.lax.scan(step, start, None, length=self.steps)[0]
 
     def blocks(self, state: LoadEstimate, balance: Balance) -> tuple[Matrix3, Matrix, Vector3]:
         """Those of the robot plus those of the estimated load."""

@@ -1,7 +1,8 @@
 """The load's share in the momentum balance, linear in ten constants.
 
-With mu = m M/(m + M) the reduced mass of load and robot, the load adds R I R' W + mu a x a' to the momentum, W its angular
-velocity and a = l + R c the way from the robot's centre of mass to its own, l ending at the tool. Written out,
+With mu = m M/(m + M) the reduced mass of load and robot, the load adds R I R' W + mu a x a' to the momentum, W its
+angular velocity and a = l + R c the way from the robot's centre of mass to its own, l ending at the tool. Written
+out,
 
     R J R' W + mu l x l' + l x (W x R h) + R h x l',    h = mu c,   J = I + mu (|c|^2 1 - c c'),
 
