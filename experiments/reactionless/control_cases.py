@@ -39,7 +39,7 @@ class Case:
 
 
 def case(load: Vector, samples: int, period: Scalar | float) -> Case:
-    """The case of a load (4,), as PUBLISHED has it. The motion is made with the true load, which no controller knows."""
+    """The case of a load (4,), as PUBLISHED has it; the motion is made with the true load, unknown to controllers."""
     mass, inertia, distance, spin = load
     target = jffsr.Target.create(inertia * jnp.ones(3), mass)
     place = jnp.stack([3.5 + distance, 0.0, 0.0])
