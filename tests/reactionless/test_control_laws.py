@@ -28,8 +28,8 @@ E, E_DOT = DESIRED.joint_position - POSITION, DESIRED.joint_velocity - VELOCITY
 R = E_DOT + SLOPE * E
 
 
-def seen(fresh=True, base_rate=np.zeros(3), quaternion=UPRIGHT):
-    return Measured(quaternion, base_rate, np.zeros(6), POSITION, VELOCITY, jnp.array(fresh))
+def seen(fresh=True, base_rate=(0.0, 0.0, 0.0), quaternion=UPRIGHT):
+    return Measured(quaternion, jnp.asarray(base_rate), np.zeros(6), POSITION, VELOCITY, jnp.array(fresh))
 
 
 def test_the_decoupled_inertia_is_what_a_joint_feels_while_the_others_give_way():
@@ -145,9 +145,11 @@ def test_computed_torque_gives_the_acceleration_it_wants():
 
 def test_a_recording_is_played_and_its_end_held():
     times = PERIOD * np.arange(3)
-    record = Recorded.of(
-        lambda t: (jnp.sin(t) * jnp.ones(2), jnp.cos(t) * jnp.ones(2), -jnp.sin(t) * jnp.ones(2)), 3, PERIOD
-    )
+
+    def motion(t):
+        return jnp.sin(t) * jnp.ones(2), jnp.cos(t) * jnp.ones(2), -jnp.sin(t) * jnp.ones(2)
+
+    record = Recorded.of(motion, 3, PERIOD)
     state = record.begin(seen())
     for k in range(5):
         state, desired = record.advance(state, 0.0, seen())

@@ -1,0 +1,1 @@
+"""Reactionless motion after capture, measured: Ye, Dong and Hong 2019."""

@@ -1,0 +1,189 @@
+"""The controllers' comparison run: machines trained, loops closed, numbers taken."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from experiments.reactionless.control_cases import ROBOT, START, case, drawn_loads, published_case
+from jffsr.compiling import jit
+from jffsr.dynamics.kinematics import kinematics
+from jffsr.dynamics.momentum import base_twist
+from jffsr.reactionless.control.computed_torque import ComputedTorque
+from jffsr.reactionless.control.errors import Gains
+from jffsr.reactionless.control.extreme_learning import HIDDEN, INPUTS, ExtremeLearning, random_machine
+from jffsr.reactionless.control.passivity import PassivityBased
+from jffsr.reactionless.control.proportional_derivative import ProportionalDerivative
+from jffsr.reactionless.control.training import MachineTraining, train_machine
+from jffsr.reactionless.plant import closed_loop
+from jffsr.reactionless.plant_mujoco import closed_loop_mujoco
+from jffsr.reactionless.plant_run import LoopRun
+from jffsr.reactionless.plant_settings import JointDisturbance, LoopSettings, Strike
+from jffsr.reactionless.plant_strike import Pendulum
+from jffsr.robots.state import State
+
+PERIOD, DURATION = 0.01, 20.0
+SAMPLES = int(DURATION / PERIOD)
+STRUCK = 10.0
+TRAINING_SAMPLES, TRAINING_LOADS, TRAINING_SEED = 400, 2, 1000
+PD, ELM, PSO, SSADE, ONES = "PD", "ELM", "PSO-ELM", "SSADE-ELM", "integrator"
+COMPUTED, PASSIVITY = "computed torque", "passivity-based"
+CONTROLLERS = (PD, ELM, PSO, SSADE, ONES, COMPUTED, PASSIVITY)
+MACHINES = (ELM, PSO, SSADE, ONES)
+SIMULATION, STROKE, HIT, QUIET = "simulation", "stroke", "hit", "undisturbed"
+_NO_STRIKE = Strike(np.zeros(6), STRUCK)
+SCENES = {
+    SIMULATION: (JointDisturbance.published(), _NO_STRIKE),
+    STROKE: (JointDisturbance.published(), Pendulum().strike(STRUCK)),
+    HIT: (JointDisturbance.published(), Pendulum().strike(STRUCK, with_force=True)),
+    QUIET: (JointDisturbance(), _NO_STRIKE),
+}
+POSTURE = np.zeros(3)
+
+
+def machines(seeds: int, evaluations: int, kept: Path | None) -> dict[str, np.ndarray]:
+    """Free numbers (seeds, 360) of each kind of machine; searches are read from `kept` where it is there."""
+    found = {ELM: np.array([random_machine(jax.random.key(seed)) for seed in range(seeds)])}
+    # Hidden nodes that are all one: the machine is then nothing but an integrator.
+    ones = np.concatenate([np.zeros(HIDDEN * INPUTS), np.full(HIDDEN, 40.0)])
+    found[ONES] = np.broadcast_to(ones, (seeds, ones.size))
+    if kept is not None and kept.exists():
+        with np.load(kept) as read:
+            return {**found, **{name: read[name][:seeds] for name in (PSO, SSADE)}}
+    problem = training_problem()
+    for name, search in ((PSO, "pso"), (SSADE, "ssade")):
+        best = []
+        for seed in range(seeds):
+            begun = time.perf_counter()
+            outcome = train_machine(problem, search, evaluations, jax.random.key(seed), chunk=20)
+            best.append(outcome.best_position)
+            seconds = time.perf_counter() - begun
+            print(f"{name} {seed}: {outcome.best_value:.5f} rad, {seconds:.1f} s", flush=True)
+        found[name] = np.array(best)
+    if kept is not None:
+        np.savez(kept, **{name: found[name] for name in (PSO, SSADE)})
+    return found
+
+
+def training_problem() -> MachineTraining:
+    """Loads drawn about the published one, which is not among them, and disturbances that no test has."""
+    loads = jnp.asarray(drawn_loads(TRAINING_SEED, TRAINING_LOADS))
+    cases = jit(jax.vmap(lambda load: case(load, TRAINING_SAMPLES, PERIOD)))(loads)
+    settings = LoopSettings(TRAINING_SAMPLES, PERIOD, disturbance=JointDisturbance.published())
+    keys = jax.random.split(jax.random.key(TRAINING_SEED), TRAINING_LOADS)
+    blank = ExtremeLearning.of(ROBOT, POSTURE, np.zeros(HIDDEN * (INPUTS + 1)))
+    return MachineTraining(cases.robot, cases.state, cases.record, keys, blank, settings)
+
+
+def controller(name: str, free: np.ndarray | None = None):
+    """One of CONTROLLERS, with the robot without load as all that it knows."""
+    if name == PD:
+        return ProportionalDerivative.of(ROBOT, POSTURE)
+    if name == COMPUTED:
+        return ComputedTorque.of(ROBOT)
+    if name == PASSIVITY:
+        return PassivityBased.of(ROBOT)
+    return ExtremeLearning.of(ROBOT, POSTURE, free)
+
+
+def settings(scene: str) -> LoopSettings:
+    """The loop of a scene, 100 Hz, no noise."""
+    disturbance, strike = SCENES[scene]
+    return LoopSettings(SAMPLES, PERIOD, disturbance=disturbance, strike=strike)
+
+
+@jit
+def _loops(published, controllers, settings, keys) -> LoopRun:
+    def one(controller, key):
+        return closed_loop(published.robot, published.state, published.record, controller, settings, key)
+
+    return jax.vmap(one)(controllers, keys)
+
+
+def loops(name: str, weights: dict[str, np.ndarray], scene: str, seeds: int) -> LoopRun:
+    """A controller's runs of a scene, leaves (seeds, ...); the seed draws the disturbance and, of machines, weights."""
+    each = [controller(name, weights[name][s] if name in weights else None) for s in range(seeds)]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(x, dtype=float) for x in leaves]), *each)
+    keys = jax.vmap(jax.random.key)(jnp.arange(seeds))
+    loop = jax.tree.map(lambda x: jnp.asarray(x, dtype=float), settings(scene))
+    return _loops(published_case(SAMPLES, PERIOD), stacked, loop, keys)
+
+
+def numbers(run: LoopRun) -> Iterator[dict]:
+    """One mapping a seed: tracking errors in rad, the base's rate in rad/s, the result code."""
+    errors, spin = np.asarray(run.error), np.asarray(run.states.base_twist)[..., 5]
+    total = np.asarray(run.momentum)
+    half = SAMPLES // 2
+    for seed, error in enumerate(errors):
+        yield {
+            "seed": seed,
+            "mean": float(error.mean()),
+            "mean_later": float(error[half:].mean()),
+            "rms": float(np.sqrt((error**2).mean())),
+            "rms_later": float(np.sqrt((error[half:] ** 2).mean())),
+            "peak": float(np.abs(error).max()),
+            "peak_later": float(np.abs(error[half:]).max()),
+            "base_rate": float(np.sqrt((spin[seed, half:] ** 2).mean())),
+            "momentum": float(np.abs(total[seed, half - 1] - total[seed, 0]).max()),
+            "torque": float(np.abs(run.torque[seed]).max()),
+            "code": int(run.code[seed]),
+        }
+
+
+def curves(run: LoopRun, seed: int = 0, every: int = 10) -> dict:
+    """What the figures show of one run, thinned."""
+    at = slice(None, None, every)
+    return {
+        "time": np.asarray(run.time)[seed, at].round(4).tolist(),
+        "error": np.asarray(run.error)[seed, at].round(7).T.tolist(),
+        "base_rate": np.asarray(run.states.base_twist)[seed, at, 5].round(8).tolist(),
+        "momentum": np.asarray(run.momentum)[seed, at, 5].round(9).tolist(),
+    }
+
+
+def on_mujoco(weights: dict[str, np.ndarray], run: LoopRun, seed: int = 0) -> dict:
+    """The simulation's run of SSADE-ELM once more with MuJoCo as the plant, and how far the two are apart."""
+    published = published_case(SAMPLES, PERIOD)
+    machine = controller(SSADE, weights[SSADE][seed])
+    arguments = (published.robot, published.state, published.record, machine, settings(SIMULATION))
+    other = closed_loop_mujoco(*arguments, jax.random.key(seed))
+    here = np.asarray(run.error)[seed]
+    there = np.asarray(other.error)
+    return {
+        "rms": float(np.sqrt((here**2).mean())),
+        "rms_mujoco": float(np.sqrt((there**2).mean())),
+        "apart": float(np.abs(here - there).max()),
+        "momentum": float(np.abs(np.asarray(other.momentum) - np.asarray(other.momentum)[0]).max()),
+        "code": int(other.code),
+    }
+
+
+def by_period(periods: tuple[float, ...], duration: float = 5.0) -> Iterator[dict]:
+    """The base's largest rate at each control period, rad/s, started on the reference, without disturbance.
+
+    Feedforward of the true compound's model with slow gains, so that sampling alone matters; and the PD beside it.
+    """
+    gains = Gains(np.full(3, 5.0), np.ones(3))
+    for period in periods:
+        count = round(duration / period)
+        published = published_case(count, period)
+        rates = published.record.joint_velocity[0]
+        start = START
+        kin = kinematics(published.robot, start)
+        twist = base_twist(published.robot, kin, rates, published.momentum)
+        start = State(start.base_position, start.base_quaternion, start.joint_position, twist, rates)
+        substeps = max(1, round(period / 0.005))
+        row = {"period": period, "started": float(jnp.linalg.norm(twist[3:]))}
+        known = {"feedforward": ComputedTorque(published.robot, gains)}
+        known["pd"] = replace(ProportionalDerivative.of(ROBOT, POSTURE), gains=gains)
+        for name, law in known.items():
+            loop = LoopSettings(count, period, substeps=substeps)
+            run = jit(closed_loop)(published.robot, start, published.record, law, loop, jax.random.key(0))
+            row[name] = float(np.abs(np.asarray(run.states.base_twist)[:, 3:]).max())
+        yield row
