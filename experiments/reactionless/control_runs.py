@@ -151,7 +151,8 @@ def on_mujoco(weights: dict[str, np.ndarray], run: LoopRun, seed: int = 0) -> di
     """The simulation's run of SSADE-ELM once more with MuJoCo as the plant, and how far the two are apart."""
     published = published_case(SAMPLES, PERIOD)
     machine = controller(SSADE, weights[SSADE][seed])
-    arguments = (published.robot, published.state, published.record, machine, settings(SIMULATION))
+    finer = replace(settings(SIMULATION), substeps=4)
+    arguments = (published.robot, published.state, published.record, machine, finer)
     other = closed_loop_mujoco(*arguments, jax.random.key(seed))
     here = np.asarray(run.error)[seed]
     there = np.asarray(other.error)
