@@ -30,6 +30,7 @@ from experiments.reactionless.control_runs import (
     machines,
     numbers,
     on_mujoco,
+    training_values,
 )
 
 PERIODS = (0.04, 0.02, 0.01, 0.005, 0.0025)
@@ -69,6 +70,7 @@ def measured(seeds: int, evaluations: int, kept: Path | None) -> list[dict]:
                 shown[f"{scene}/{name}"] = curves(run)
             if (scene, name) == (SIMULATION, SSADE):
                 facts["mujoco"] = on_mujoco(weights, run)
+    facts["training"] = training_values(weights)
     facts["periods"] = list(by_period(PERIODS))
     return [facts, shown, *rows]
 

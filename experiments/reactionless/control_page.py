@@ -42,6 +42,7 @@ def tables(facts: dict, rows: list[dict]) -> str:
     parts = [_about(facts)]
     for scene, title in TITLES.items():
         parts += [f"## {title}", _table(scene, [row for row in rows if row["scene"] == scene])]
+    parts += ["## On the training runs", _training(facts["training"])]
     parts += ["## SSADE-ELM against the others, seed by seed", _duels(rows)]
     parts += ["## MuJoCo as the plant", _mujoco(facts["mujoco"])]
     parts += ["## Sampling", _periods(facts["periods"])]
@@ -83,6 +84,12 @@ def _table(scene: str, rows: list[dict]) -> str:
     return "\n".join(lines)
 
 
+def _training(values: dict[str, float]) -> str:
+    lines = ["| machine | rms on the training runs [rad], median |", "|---|---|"]
+    lines += [f"| {name} | {value:.4g} |" for name, value in values.items()]
+    return "\n".join(lines)
+
+
 def _duels(rows: list[dict]) -> str:
     lines = [
         "| scene | SSADE-ELM's rms lower than ELM's | than PSO-ELM's | than the integrator's | medians: SSADE-ELM, "
@@ -108,14 +115,15 @@ def _duels(rows: list[dict]) -> str:
 def _mujoco(found: dict) -> str:
     return (
         f"SSADE-ELM, seed 0, the simulation: rms {found['rms']:.4g} rad here and {found['rms_mujoco']:.4g} rad in "
-        f"MuJoCo; joint errors differ by at most {found['apart']:.2g} rad over the 20 s (MuJoCo has four steps a period, ours one); MuJoCo's momentum moves by "
+        f"MuJoCo; joint errors differ by at most {found['apart']:.2g} rad over the 20 s. MuJoCo "
+        f"has four steps a period, the other plant one; MuJoCo's momentum moves by "
         f"{found['momentum']:.1e}; result {LoopCode(found['code']).name}."
     )
 
 
 def _periods(rows: list[dict]) -> str:
     lines = [
-        "The base's largest rate, rad/s, in 5 s that start on the reference, undisturbed, with K = 5/s and Lambda = 1/s. "
+        "The base's largest rate, rad/s, in 5 s that start on the reference, undisturbed, K = 5/s and Lambda = 1/s. "
         "Feedforward is computed torque with the true compound's model, so that only holding the torque over the "
         "period is left; PD knows the robot without load.",
         "",
