@@ -34,8 +34,9 @@ STRUCK = 10.0
 TRAINING_SAMPLES, TRAINING_LOADS, TRAINING_SEED = 400, 2, 1000
 PD, ELM, PSO, SSADE, ONES = "PD", "ELM", "PSO-ELM", "SSADE-ELM", "integrator"
 COMPUTED, PASSIVITY = "computed torque", "passivity-based"
-CONTROLLERS = (PD, ELM, PSO, SSADE, ONES, COMPUTED, PASSIVITY)
-MACHINES = (ELM, PSO, SSADE, ONES)
+PSO_LONG, SSADE_LONG = "PSO-ELM, 30,000", "SSADE-ELM, 30,000"
+CONTROLLERS = (PD, ELM, PSO, SSADE, PSO_LONG, SSADE_LONG, ONES, COMPUTED, PASSIVITY)
+LONG = 30_000
 SIMULATION, STROKE, HIT, QUIET = "simulation", "stroke", "hit", "undisturbed"
 _NO_STRIKE = Strike(np.zeros(6), STRUCK)
 SCENES = {
@@ -48,27 +49,37 @@ POSTURE = np.zeros(3)
 
 
 def machines(seeds: int, evaluations: int, kept: Path | None) -> dict[str, np.ndarray]:
-    """Free numbers (seeds, 360) of each kind of machine; searches are read from `kept` where it is there."""
+    """Free numbers (seeds, 360) of each kind of machine; of the paper's full budget, one seed.
+
+    What the searches found is read from `kept` where it is there.
+    """
     found = {ELM: np.array([random_machine(jax.random.key(seed)) for seed in range(seeds)])}
     # Hidden nodes that are all one: the machine is then nothing but an integrator.
     ones = np.concatenate([np.zeros(HIDDEN * INPUTS), np.full(HIDDEN, 40.0)])
     found[ONES] = np.broadcast_to(ones, (seeds, ones.size))
     if kept is not None and kept.exists():
         with np.load(kept) as read:
-            return {**found, **{name: read[name][:seeds] for name in (PSO, SSADE)}}
+            return {**found, **{name: read[name][:seeds] for name in read.files}}
     problem = training_problem()
-    for name, search in ((PSO, "pso"), (SSADE, "ssade")):
+    jobs = ((PSO, "pso", evaluations, seeds), (SSADE, "ssade", evaluations, seeds))
+    for name, search, budget, count in (*jobs, (PSO_LONG, "pso", LONG, 1), (SSADE_LONG, "ssade", LONG, 1)):
         best = []
-        for seed in range(seeds):
+        for seed in range(count):
             begun = time.perf_counter()
-            outcome = train_machine(problem, search, evaluations, jax.random.key(seed), chunk=20)
+            outcome = train_machine(problem, search, budget, jax.random.key(seed), chunk=20)
             best.append(outcome.best_position)
             seconds = time.perf_counter() - begun
             print(f"{name} {seed}: {outcome.best_value:.5f} rad, {seconds:.1f} s", flush=True)
         found[name] = np.array(best)
     if kept is not None:
-        np.savez(kept, **{name: found[name] for name in (PSO, SSADE)})
+        np.savez(kept, **{name: found[name] for name in (PSO, SSADE, PSO_LONG, SSADE_LONG)})
     return found
+
+
+def training_values(weights: dict[str, np.ndarray]) -> dict[str, float]:
+    """What each kind of machine comes to on the training runs, rad: the median over the seeds."""
+    value = jit(jax.vmap(training_problem().value))
+    return {name: float(np.median(value(jnp.asarray(free)))) for name, free in weights.items()}
 
 
 def training_problem() -> MachineTraining:
@@ -108,6 +119,7 @@ def _loops(published, controllers, settings, keys) -> LoopRun:
 
 def loops(name: str, weights: dict[str, np.ndarray], scene: str, seeds: int) -> LoopRun:
     """A controller's runs of a scene, leaves (seeds, ...); the seed draws the disturbance and, of machines, weights."""
+    seeds = min(seeds, len(weights[name])) if name in weights else seeds
     each = [controller(name, weights[name][s] if name in weights else None) for s in range(seeds)]
     stacked = jax.tree.map(lambda *leaves: jnp.stack([jnp.asarray(x, dtype=float) for x in leaves]), *each)
     keys = jax.vmap(jax.random.key)(jnp.arange(seeds))
@@ -151,7 +163,8 @@ def on_mujoco(weights: dict[str, np.ndarray], run: LoopRun, seed: int = 0) -> di
     """The simulation's run of SSADE-ELM once more with MuJoCo as the plant, and how far the two are apart."""
     published = published_case(SAMPLES, PERIOD)
     machine = controller(SSADE, weights[SSADE][seed])
-    arguments = (published.robot, published.state, published.record, machine, settings(SIMULATION))
+    finer = replace(settings(SIMULATION), substeps=4)
+    arguments = (published.robot, published.state, published.record, machine, finer)
     other = closed_loop_mujoco(*arguments, jax.random.key(seed))
     here = np.asarray(run.error)[seed]
     there = np.asarray(other.error)
