@@ -13,6 +13,7 @@ from jffsr.errors import InputError
 from jffsr.reactionless.control.computed_torque import ComputedTorque
 from jffsr.reactionless.control.errors import Gains
 from jffsr.reactionless.control.extreme_learning import HIDDEN, INPUTS, ExtremeLearning
+from jffsr.reactionless.control.learnt_load import LearntLoad
 from jffsr.reactionless.control.passivity import PassivityBased
 from jffsr.reactionless.control.proportional_derivative import ProportionalDerivative
 from jffsr.reactionless.estimation.adaptive import AdaptiveReactionless
@@ -101,7 +102,7 @@ def hold_still(
         attitude_gain=hold.attitude_gain,
         end_effector=end_effector,
     )
-    controller = build_controller(hold, robot, state, where)
+    controller = build_controller(hold, robot, state, where, end_effector)
     settings = replace(loop_settings(hold, robot), strike=strike)
     keys = jnp.stack([jax.random.key(hold.seed + k) for k in range(seeds)])
     if in_mujoco:
@@ -123,12 +124,16 @@ def load_model(hold: Hold, known: KnownLoad) -> LoadModel:
     }[hold.estimator]()
 
 
-def build_controller(hold: Hold, robot: Robot, state: State, where: str) -> Controller:
+def build_controller(
+    hold: Hold, robot: Robot, state: State, where: str, end_effector: str | None = None
+) -> Controller:
     """The controller by its name; an extreme learning machine's input weights are random, by the seed."""
     gains = Gains(
         *(_per_joint(getattr(hold.gains, key), robot, f"{where}.gains.{key}") for key in ("rate", "position"))
     )
     period, q = 1 / hold.rate, np.asarray(state.joint_position)
+    if hold.controller == "learnt_load":
+        return LearntLoad.of(robot, gains, end_effector=end_effector)
     if hold.controller == "computed_torque":
         return ComputedTorque.of(robot, gains)
     if hold.controller == "passivity_based":

@@ -17,7 +17,7 @@ ESTIMATORS = (
     "plain",
     "known",
 )
-CONTROLLERS = ("passivity_based", "computed_torque", "elm", "pd")
+CONTROLLERS = ("learnt_load", "passivity_based", "computed_torque", "elm", "pd")
 EstimatorName = Annotated[
     Literal[
         "load_parameters",
@@ -29,7 +29,9 @@ EstimatorName = Annotated[
     ],
     choice(*ESTIMATORS),
 ]
-ControllerName = Annotated[Literal["passivity_based", "computed_torque", "elm", "pd"], choice(*CONTROLLERS)]
+ControllerName = Annotated[
+    Literal["learnt_load", "passivity_based", "computed_torque", "elm", "pd"], choice(*CONTROLLERS)
+]
 Positive = Annotated[float, number(gt=0)]
 NotNegative = Annotated[float, number(ge=0)]
 
@@ -100,7 +102,7 @@ class Hold(Section):
     substeps: Annotated[int, whole(1, 1000)] = 1  # of the plant's integration in a sample
     delay: Annotated[int, whole(0, 1000)] = 0  # samples from a measurement to its torque
     estimator: EstimatorName = "load_parameters"
-    controller: ControllerName = "passivity_based"
+    controller: ControllerName = "learnt_load"
     gains: Gains = Gains()
     excitation: Excitation = Excitation(amplitude=0.05)
     attitude_gain: NotNegative = 0.0  # 1/s, back to the attitude at the start
