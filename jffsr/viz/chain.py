@@ -62,25 +62,27 @@ def draw_observation(observation: Dataset) -> Figure:
     ):
         look = line_look(number) | {"linestyle": "none"}
         panels[0].plot(time[chosen], 1e3 * off[chosen], marker=mark, markersize=2.5, label=label, **look)
-    panels[0].set(ylabel="pose less estimate [mm]", yscale="log")
-    panels[0].legend(ncols=2)
+    panels[0].set(ylabel="pose off by [mm]", yscale="log")
+    panels[0].legend(ncols=2, loc="upper right")
     rate = np.rad2deg(observation["angular_velocity"].values)
     for axis, name in enumerate("xyz"):
         panels[1].plot(time, rate[:, axis], label=f"$\\omega_{name}$", **line_look(axis))
-    panels[1].set_ylabel("estimated rate [deg/s]")
-    panels[1].legend(ncols=3)
+    panels[1].set_ylabel("rate [deg/s]")
+    panels[1].legend(ncols=3, loc="upper right")
     deviation = observation["deviation"].values
     parts = (
-        (slice(0, 3), 180 / np.pi, "attitude [deg]"),
-        (slice(3, 6), 180 / np.pi, "rate [deg/s]"),
-        (slice(11, 14), 1e3, "position [mm]"),
+        (slice(0, 3), 180 / np.pi, "attitude, deg"),
+        (slice(3, 6), 180 / np.pi, "rate, deg/s"),
+        (slice(11, 14), 1e3, "position, mm"),
     )
     for number, (part, scale, label) in enumerate(parts):
         size = scale * np.linalg.norm(deviation[:, part], axis=1)
         panels[2].plot(time, size, label=label, **line_look(number))
     panels[2].set(ylabel="deviation", yscale="log", xlabel="time [s]")
-    panels[2].legend(ncols=3)
+    panels[2].legend(ncols=3, loc="upper right")
     for axes in panels:
         axes.margins(x=0)
+        # Room for the legend above the curves.
+        axes.margins(y=0.25)
     figure.align_ylabels()
     return figure

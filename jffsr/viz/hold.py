@@ -40,6 +40,9 @@ def draw_hold(
     smooth = running_rms(time, spin, WINDOW)
     panels[0].plot(time, np.rad2deg(np.maximum(smooth, _LEAST)), color=COLOURS[1])
     panels[0].set(yscale="log", ylabel="base rate [deg/s]")
+    moving = smooth[smooth > _LEAST]
+    if moving.size:
+        panels[0].set_ylim(bottom=np.rad2deg(0.3 * moving.min()))
     if allowed is not None:
         panels[0].axhline(np.rad2deg(allowed), color=GREY, linestyle=(0, (4, 2)), linewidth=0.7)
     panels[1].plot(time, np.rad2deg(turns(dataset["base_quaternion"].values)), color=COLOURS[1])
