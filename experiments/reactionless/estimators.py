@@ -105,7 +105,7 @@ def measure(scene: Scene, model: LoadModel, cases: dict, noise: SensorNoise, see
 
 
 def lines(count: int, studies: tuple[Study, ...] = STUDIES, first: int = 0) -> tuple[list[dict], dict]:
-    """One line for each study, estimator, noise and seed; and median courses of the first study."""
+    """One line for each study, estimator and noise, with a value for each seed; and the median courses."""
     found, courses = [], {}
     seeds = list(range(first, first + count))
     for study in studies:
@@ -116,9 +116,8 @@ def lines(count: int, studies: tuple[Study, ...] = STUDIES, first: int = 0) -> t
                 numbers = measure(study.scene, model, cases, noise, seeds)
                 course = numbers.pop("course")
                 courses[study.name, name, label] = np.median(course, axis=0)
-                for k, seed in enumerate(seeds):
-                    line = {"study": study.name, "estimator": name, "noise": label, "seed": seed}
-                    found.append(line | {key: float(f"{value[k]:.4g}") for key, value in numbers.items()})
+                line = {"study": study.name, "estimator": name, "noise": label, "first_seed": first}
+                found.append(line | {key: [float(f"{v:.3g}") for v in x] for key, x in numbers.items()})
                 summary = {key: float(np.median(value)) for key, value in numbers.items()}
                 print(study.name, name, label, {k: f"{v:.3g}" for k, v in summary.items()}, flush=True)
     return found, courses
@@ -131,7 +130,7 @@ def tables(found: list[dict]) -> str:
         own = [line for line in found if line["study"] == study.name]
         if not own:
             continue
-        seeds = len({line["seed"] for line in own})
+        seeds = len(own[0]["drift"])
         arm = study.scene.robot.name
         text.append(
             f"`{arm}`, r = {study.variance:g} (N m s)^2 in the least squares, {seeds} seeds: median (worst).\n\n"
@@ -140,13 +139,12 @@ def tables(found: list[dict]) -> str:
         )
         for name in study.names:
             for noise in ("none", "sensors"):
-                picked = [line for line in own if line["estimator"] == name and line["noise"] == noise]
-                cells = []
-                for key in ("drift", "before", "end"):
-                    values = [line[key] for line in picked]
-                    cells.append(f"{np.median(values):.2g} ({np.max(values):.2g})")
-                trace = max(line["trace"] for line in picked)
-                text.append(f"| {name} | {noise} | {' | '.join(cells)} | {trace:.3g} |")
+                line = next(one for one in own if one["estimator"] == name and one["noise"] == noise)
+                cells = [
+                    f"{np.median(line[key]):.2g} ({np.max(line[key]):.2g})"
+                    for key in ("drift", "before", "end")
+                ]
+                text.append(f"| {name} | {noise} | {' | '.join(cells)} | {max(line['trace']):.3g} |")
         text.append("")
     return "\n".join(text).strip()
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -25,9 +26,6 @@ from jffsr.robots.state import State
 from jffsr.rollouts.rollout import check_steps, rollout
 from jffsr.spatial.rotation import quaternion_to_rotation_vector
 from jffsr.types import Array, Scalar, Vector
-
-# The path's steps are that many times as fine as the search's, and this many iterations bring it to its end again.
-_FINER, _POLISHING = 4, 6
 
 
 class ManoeuvreCode(IntEnum):
@@ -44,16 +42,16 @@ class ManoeuvreCode(IntEnum):
 @dataclass(frozen=True)
 class ManoeuvreSettings:
     """degree: of the polynomials in zeta, per joint; starts: searched at once; scatter, rad or m: deviation of their
-    coefficients; iterations: of each; steps: of the search's integration, and a quarter of the path's; tolerance,
-    rad or m: of the goal; turn, rad: largest rotation of the base in the rollout that verifies."""
+    coefficients; iterations: of each; steps: of the integration; tolerance, rad or m: of the goal; turn, rad: largest
+    rotation of the base in the rollout that verifies."""
 
     degree: int = 4
     starts: int = 6
     scatter: float = 1.0
     iterations: int = 80
-    steps: int = 40
+    steps: int = 160
     tolerance: float = 1e-8
-    turn: float = 1e-7
+    turn: float = 1e-6
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Manoeuvre:
     path: SampledPath | None
     end_error: float
     turn: float
-    reach: Reach
+    reach: Reach | None = None
 
     @property
     def success(self) -> bool:
@@ -96,30 +94,30 @@ def zero_reaction_manoeuvre(
     about = np.random.default_rng(0).normal(scale=0.2, size=(4, robot.num_joints)) + 0.5 * (start + goal)
     postures = np.concatenate([[start, goal], about])
     rows = coupling_rows(robot, postures)
-    reach = reach_of(robot, rows, postures)
     apart = float(np.max(np.abs(goal - start)))
-    if reach.null_dimension == 0 and apart > settings.tolerance:
+    if len(rows) >= robot.num_joints and apart > settings.tolerance:
         text = (
-            f"none can exist: {robot.num_joints} joints have no rates that leave the base alone, for the coupling has
-            rank " f"{len(rows)}; use an arm with more joints, or hold fewer axes"
+            f"none can exist: {robot.num_joints} joints have no rates that leave the base alone, for the coupling "
+            f"has rank {len(rows)}; use an arm with more joints"
         )
-        return Manoeuvre(ManoeuvreCode.NO_NULL_SPACE, text, None, apart, np.nan, reach)
+        return Manoeuvre(ManoeuvreCode.NO_NULL_SPACE, text, None, apart, np.nan, Reach(0, 0))
     key = jax.random.PRNGKey(0) if key is None else key
     shape = (settings.starts, robot.num_joints, settings.degree + 1)
     # The first goes straight, as far as the null space lets it.
     first = settings.scatter * jax.random.normal(key, shape).at[0].set(0.0)
     first = first.at[:, :, 0].add(goal - start)
-    given = robot, jnp.asarray(rows), jnp.asarray(start), jnp.asarray(goal)
-    coefficients, errors, lengths = _search(*given, first, settings.iterations, steps)
+    given = robot, jnp.asarray(rows), jnp.asarray(start)
+    found = _search(*given, jnp.asarray(goal), first, settings.iterations, steps)
+    coefficients, errors, lengths = (np.asarray(x) for x in found)
+    errors = np.where(np.isfinite(errors), errors, np.inf)
     arrived = errors <= settings.tolerance
     if not np.any(arrived):
+        reach = reach_of(robot, rows, postures)
         return _none(reach, robot.num_joints, float(np.min(errors)), settings)
     best = int(np.argmin(np.where(arrived, lengths, np.inf)))
-    # Finer steps: between its samples a path is only as still as they are consistent with each other.
-    coefficients, errors, _ = _search(*given, coefficients[best][None], _POLISHING, _FINER * steps)
-    q, qd, qdd = _sampled(*given[:3], coefficients[0], _FINER * steps)
+    q, qd, qdd = _sampled(*given, jnp.asarray(coefficients[best]), steps)
     path = SampledPath(q, qd / duration, qdd / duration**2, jnp.asarray(float(duration)))
-    return _judged(robot, path, float(errors[0]), settings, reach)
+    return _judged(robot, path, float(errors[best]), settings)
 
 
 def _window(s: Scalar) -> Scalar:
@@ -157,62 +155,62 @@ def _integrated(robot: Robot, rows: Array, start: Vector, coefficients: Array, s
     return jnp.concatenate([positions, last[None]])
 
 
-def _search(robot, rows, start, goal, first, iterations, steps):
-    """Coefficients (k, n, d), end errors (k,) and squared lengths (k,) of the paths from k starts."""
+@partial(jit, static_argnames=("iterations", "steps"))
+def _search(
+    robot: Robot, rows: Array, start: Vector, goal: Vector, first: Array, iterations: int, steps: int
+) -> tuple[Array, Array, Array]:
+    """Coefficients (k, n, d), end errors (k,) and squared lengths (k,) of the paths from k first ones."""
 
-    def one(start, goal, first):
+    def one(first):
         def miss(flat):
             path = _integrated(robot, rows, start, flat.reshape(first.shape), steps)
-            return path[-1] - goal
+            return path[-1] - goal, (path[-1] - goal, jnp.sum(jnp.diff(path, axis=0) ** 2))
 
         def step(carry, _):
-            flat, error, damping = carry
-            slope = jax.jacrev(miss)(flat)
+            # The slope is taken where the last one was tried, so that one integration does for both.
+            flat, error, slope, length, change, damping = carry
+            tried = flat + change
+            there, (missed, way) = jax.jacfwd(miss, has_aux=True)(tried)
+            better = jnp.sum(missed**2) <= jnp.sum(error**2)
+            flat, error, slope, length = (
+                jnp.where(better, new, old)
+                for new, old in ((tried, flat), (missed, error), (there, slope), (way, length))
+            )
+            damping = jnp.clip(jnp.where(better, damping / 8, damping * 4), 1e-12, 1e6)
             square = slope @ slope.T
             spread = damping * jnp.trace(square) / goal.size * jnp.eye(goal.size)
             change = -slope.T @ jnp.linalg.solve(square + spread, error)
-            tried = flat + change
-            missed = miss(tried)
-            better = jnp.sum(missed**2) < jnp.sum(error**2)
-            flat, error = jnp.where(better, tried, flat), jnp.where(better, missed, error)
-            return (flat, error, jnp.clip(jnp.where(better, damping / 8, damping * 4), 1e-12, 1e6)), None
+            return (flat, error, slope, length, change, damping), None
 
         flat = first.ravel()
-        (flat, error, _), _ = jax.lax.scan(step, (flat, miss(flat), 1e-3), None, length=iterations)
-        path = _integrated(robot, rows, start, flat.reshape(first.shape), steps)
-        return flat.reshape(first.shape), jnp.max(jnp.abs(error)), jnp.sum(jnp.diff(path, axis=0) ** 2)
+        nothing = jnp.full_like(goal, jnp.inf), jnp.zeros((goal.size, flat.size)), jnp.zeros(())
+        start_of_search = flat, *nothing, jnp.zeros_like(flat), jnp.asarray(1e-2)
+        (flat, error, _, length, _, _), _ = jax.lax.scan(step, start_of_search, None, length=iterations + 1)
+        return flat.reshape(first.shape), jnp.max(jnp.abs(error)), length
 
-    found = jit(jax.vmap(one, (None, None, 0)))(start, goal, first)
-    coefficients, errors, lengths = (np.asarray(x) for x in found)
-    return coefficients, np.where(np.isfinite(errors), errors, np.inf), lengths
+    return jax.vmap(one)(first)
 
 
-def _sampled(robot, rows, start, coefficients, steps):
+@partial(jit, static_argnames="steps")
+def _sampled(
+    robot: Robot, rows: Array, start: Vector, coefficients: Array, steps: int
+) -> tuple[Array, Array, Array]:
     """Positions, and rates and accelerations by the share of the way, (steps + 1, n) each."""
 
-    @jit
-    def found(start, coefficients):
-        path = _integrated(robot, rows, start, coefficients, steps)
-        shares = jnp.linspace(0.0, 1.0, steps + 1)
+    def rate(q: Vector, s: Scalar) -> Vector:
+        return _rate(robot, rows, coefficients, q, s)
 
-        def both(q, s):
-            rate = _rate(robot, rows, coefficients, q, s)
-            along = jax.jvp(
-                lambda q, s: _rate(robot, rows, coefficients, q, s), (q, s), (rate, jnp.ones_like(s))
-            )
-            return along
+    def both(q: Vector, s: Scalar) -> tuple[Vector, Vector]:
+        return jax.jvp(rate, (q, s), (rate(q, s), jnp.ones_like(s)))
 
-        return path, *jax.vmap(both)(path, shares)
-
-    return found(start, jnp.asarray(coefficients))
+    path = _integrated(robot, rows, start, coefficients, steps)
+    return path, *jax.vmap(both)(path, jnp.linspace(0.0, 1.0, steps + 1))
 
 
-def _judged(
-    robot: Robot, path: SampledPath, error: float, settings: ManoeuvreSettings, reach: Reach
-) -> Manoeuvre:
+def _judged(robot: Robot, path: SampledPath, error: float, settings: ManoeuvreSettings) -> Manoeuvre:
     """The path with what a rollout and the robot's limits say of it."""
     still = State(jnp.zeros(3), jnp.array([1.0, 0.0, 0.0, 0.0]), path.joint_position[0])
-    motion = jit(lambda path: rollout(robot, path, still, num_steps=2 * _FINER * settings.steps))(path)
+    motion = jit(lambda path: rollout(robot, path, still, num_steps=2 * settings.steps))(path)
     turns = np.linalg.norm(jax.vmap(quaternion_to_rotation_vector)(motion.base_quaternion), axis=-1)
     turn = float(np.max(turns))
     q, rate = np.asarray(motion.joint_grid.joint_position), np.asarray(motion.joint_grid.joint_velocity)
@@ -220,42 +218,55 @@ def _judged(
     outside = np.max(np.maximum(q - limits.position_upper, limits.position_lower - q), axis=0)
     faster = np.max(np.abs(rate), axis=0) / np.asarray(limits.velocity)
     if not turn <= settings.turn or not error <= settings.tolerance:
-        code, text = ManoeuvreCode.NOT_VERIFIED, (
-            f"not verified: in a rollout of its own the base turns by {turn:.3g} rad, and the path ends {error:.3g}
-            from " "the goal; raise steps"
+        code, text = (
+            ManoeuvreCode.NOT_VERIFIED,
+            (
+                f"not verified: in a rollout of its own the base turns by {turn:.3g} rad, and the path ends "
+                f"{error:.3g} from the goal; raise steps"
+            ),
         )
     elif np.any(outside > 0):
         joint = robot.joint_names[int(np.argmax(outside))]
-        code, text = ManoeuvreCode.LIMITS_EXCEEDED, (
-            f"'{joint}' leaves its range by {np.max(outside):.3g} on the way; try more starts or another goal"
+        code, text = (
+            ManoeuvreCode.LIMITS_EXCEEDED,
+            (
+                f"'{joint}' leaves its range by {np.max(outside):.3g} on the way; try more starts or another goal"
+            ),
         )
     elif np.any(faster > 1):
         joint = robot.joint_names[int(np.argmax(faster))]
         least = float(path.duration) * float(np.max(faster))
-        code, text = ManoeuvreCode.LIMITS_EXCEEDED, (
-            f"'{joint}' is {np.max(faster):.3g} times as fast as it may be; the same way takes {least:.4g} s or more"
+        code, text = (
+            ManoeuvreCode.LIMITS_EXCEEDED,
+            (f"'{joint}' is {np.max(faster):.3g} times as fast as it may be; allow {least:.4g} s or more"),
         )
     else:
-        code, text = ManoeuvreCode.FOUND, (
-            f"the goal is reached to {error:.2g} while the base turns by {turn:.2g} rad at most"
+        code, text = (
+            ManoeuvreCode.FOUND,
+            (f"the goal is reached to {error:.2g} while the base turns by {turn:.2g} rad at most"),
         )
-    return Manoeuvre(code, text, path, error, turn, reach)
+    return Manoeuvre(code, text, path, error, turn)
 
 
 def _none(reach: Reach, joints: int, error: float, settings: ManoeuvreSettings) -> Manoeuvre:
     """What to say where no start arrived."""
+    of = f"the {reach.null_dimension} rates without reaction and their brackets of two and three"
+    nearest = f"the nearest arrival is {error:.3g} away"
     if reach.bracket_rank < joints:
-        code, text = ManoeuvreCode.ON_A_SURFACE, (
-            f"none was found, and most goals have none: the {reach.null_dimension} rates without reaction and their "
-            f"brackets of two and three span {reach.bracket_rank} of {joints} dimensions in every posture looked at,
-            so that " f"what can be reached is a surface of so many through the start; the nearest arrival is
-            {error:.3g} away"
+        code, text = (
+            ManoeuvreCode.ON_A_SURFACE,
+            (
+                f"none was found, and most goals have none: {of} span {reach.bracket_rank} of {joints} dimensions in "
+                f"every posture looked at, so that a surface of so many through the start is all there is; {nearest}"
+            ),
         )
     else:
-        code, text = ManoeuvreCode.NOT_FOUND, (
-            f"none was found from {settings.starts} starts, though one may exist: brackets of the
-            {reach.null_dimension} " f"rates without reaction span all {joints} dimensions; the nearest arrival is
-            {error:.3g} away; raise starts, " "degree or iterations, or go by a posture between"
+        code, text = (
+            ManoeuvreCode.NOT_FOUND,
+            (
+                f"none was found from {settings.starts} starts, though one may exist: {of} span all {joints} "
+                f"dimensions; {nearest}; raise starts, degree or iterations, or go by a posture between"
+            ),
         )
     return Manoeuvre(code, text, None, error, np.nan, reach)
 

@@ -40,13 +40,13 @@ class SampledPath:
         """Position, rate and acceleration (n,) each at a time, s."""
         steps = self.joint_position.shape[0] - 1
         h = self.duration / steps
+        samples = [
+            jnp.asarray(x) for x in (self.joint_position, self.joint_velocity, self.joint_acceleration)
+        ]
         place = jnp.clip(time / h, 0.0, steps)
         k = jnp.clip(jnp.floor(place).astype(int), 0, steps - 1)
         s = place - k
-        ends = [
-            jnp.stack([x[k] * h**power, x[k + 1] * h**power])
-            for power, x in enumerate((self.joint_position, self.joint_velocity, self.joint_acceleration))
-        ]
+        ends = [jnp.stack([x[k] * h**power, x[k + 1] * h**power]) for power, x in enumerate(samples)]
         values = jnp.concatenate([jnp.stack([x[0] for x in ends]), jnp.stack([x[1] for x in ends])])
         coefficients = _QUINTIC.T @ values
         powers = jnp.arange(6)

@@ -74,17 +74,18 @@ def reach_of(robot: Robot, rows: np.ndarray, postures: np.ndarray) -> Reach:
         return found
 
     twos = brackets(fields, fields)
-
-    @jax.jit
-    def spans(q):
-        return fields(q), twos(q), brackets(fields, twos)(q)
-
     best = Reach(0, 0)
-    for q in postures:
-        first, second, third = (np.asarray(x) for x in spans(jnp.asarray(q)))
-        if np.all(np.isfinite(third)):
-            together = np.concatenate([first, second, third], axis=1)
-            best = max(best, Reach(_rank(first), _rank(together)), key=lambda reach: reach.bracket_rank)
+    # Brackets of three take long to compile, and are rarely needed.
+    for depth in (lambda q: twos(q), lambda q: jnp.concatenate([twos(q), brackets(fields, twos)(q)], axis=1)):
+        first, more = (
+            np.asarray(x) for x in jax.jit(jax.vmap(lambda q, d=depth: (fields(q), d(q))))(postures)
+        )
+        for one, others in zip(first, more, strict=True):
+            if np.all(np.isfinite(others)):
+                found = Reach(_rank(one), _rank(np.concatenate([one, others], axis=1)))
+                best = max(best, found, key=lambda reach: reach.bracket_rank)
+        if best.bracket_rank == n:
+            break
     return best
 
 
