@@ -199,3 +199,25 @@ def test_codes_go_from_bad_to_good():
 def test_settings_without_sense_are_refused(make, told):
     with pytest.raises(jffsr.InputError, match=told):
         make()
+
+
+@pytest.mark.slow
+def test_derivatives_of_a_run_are_finite_differences():
+    """Of a late joint angle, by the gains and the load's mass, through sensors, limits and the plant."""
+
+    def outcome(values):
+        gain, mass = values
+        gains = Gains(gain * np.array([4.0, 3.0, 2.0]), np.ones(3))
+        robot = jffsr.weld(ROBOT, jffsr.RigidBody(mass, np.zeros(3), 2.5 * jnp.eye(3)))
+        controller = ProportionalDerivative.of(ROBOT, POSTURE, gains)
+        settings = LoopSettings(30, sensors=Sensors(gyro=1e-3, encoder=1e-4, rate=1e-3), torque_limit=50.0)
+        run = closed_loop(robot, START, waves(30, 0.5), controller, settings, jax.random.key(1))
+        return run.states.joint_position[-1, 2]
+
+    at = jnp.array([1.0, 5.0])
+    value, slope = jit(jax.value_and_grad(outcome))(at)
+    compiled = jit(outcome)
+    h = 1e-5
+    differences = [(compiled(at + h * e) - compiled(at - h * e)) / (2 * h) for e in np.eye(2)]
+    assert np.isfinite(value)
+    np.testing.assert_allclose(slope, differences, rtol=1e-5, atol=1e-10)
