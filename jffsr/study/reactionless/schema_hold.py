@@ -32,6 +32,10 @@ EstimatorName = Annotated[
 ControllerName = Annotated[
     Literal["learnt_load", "passivity_based", "computed_torque", "elm", "pd"], choice(*CONTROLLERS)
 ]
+Axes = Annotated[
+    tuple[Annotated[Literal["x", "y", "z"], choice("x", "y", "z")], ...],
+    sequence("a list of one to three of x, y, z", 1, 3),
+]
 Positive = Annotated[float, number(gt=0)]
 NotNegative = Annotated[float, number(ge=0)]
 
@@ -105,6 +109,11 @@ class Hold(Section):
     controller: ControllerName = "learnt_load"
     gains: Gains = Gains()
     excitation: Excitation = Excitation(amplitude=0.05)
+    axes: Axes = (
+        "x",
+        "y",
+        "z",
+    )  # of the base that are held; a planar arm can hold only the one it turns about
     attitude_gain: NotNegative = 0.0  # 1/s, back to the attitude at the start
     limits: Annotated[bool, flag()] = True  # the robot's joint rates, accelerations and torques are kept
     sensors: Sensors = Sensors()
@@ -122,6 +131,8 @@ class Hold(Section):
 
     @model_validator(mode="after")
     def _check(self) -> Hold:
+        if len(set(self.axes)) < len(self.axes):
+            raise conflict(f"found {list(self.axes)}, each axis once is expected", "axes")
         if self.settled > self.duration:
             raise conflict(
                 f"found {self.settled:g} s, at most the duration ({self.duration:g} s) is expected", "settled"
