@@ -1,7 +1,7 @@
 """How often a whole chain ends with the target in hand and the base still, and what fails in the others.
 
 Random captures (those of `experiments.captures`, from a seed of their own), each as a study of configs/chain: a camera
-sees the box for 160 s with a marker somewhere on it and a rough guess of its inertia, and all the rest follows. Every
+sees the box for 300 s with a marker somewhere on it and a rough guess of its inertia, and all the rest follows. Every
 run keeps its folder, so that the same command goes on where it was stopped.
 
 Run it from the root of the repository: `python -m experiments.chain`; `--part 0/2` and `--part 1/2` share the work.
@@ -53,6 +53,9 @@ def overrides(sample: Sample, number: int) -> list[str]:
         "seed": number,
         "grasp_time.window": list(WINDOW),
         "planner.times": 4,
+        "planner.starts": 12,
+        "planner.postures": 6,
+        "observation.duration": 300.0,
         "output.figures": "false",
         "output.progress": "false",
     }
