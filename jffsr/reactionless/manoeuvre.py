@@ -9,6 +9,7 @@ coefficients are; only the arrival is searched for.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import partial
@@ -23,9 +24,13 @@ from jffsr.reactionless.manoeuvre_path import SampledPath
 from jffsr.reactionless.manoeuvre_space import Reach, coupling_rows, null_projector, reach_of
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import check_steps, rollout
 from jffsr.spatial.rotation import quaternion_to_rotation_vector
 from jffsr.types import Array, Scalar, Vector
+
+# The path's steps are that many times as fine as the search's, and this many iterations bring it to its end again.
+_FINER, _POLISHING = 4, 12
 
 
 class ManoeuvreCode(IntEnum):
@@ -42,14 +47,16 @@ class ManoeuvreCode(IntEnum):
 @dataclass(frozen=True)
 class ManoeuvreSettings:
     """degree: of the polynomials in zeta, per joint; starts: searched at once; scatter, rad or m: deviation of their
-    coefficients; iterations: of each; steps: of the integration; tolerance, rad or m: of the goal; turn, rad: largest
-    rotation of the base in the rollout that verifies."""
+    coefficients; iterations: of each; steps: of the search's integration, a quarter of the path's; pieces: into as
+    many, by postures on the straight line to the goal, the way may be cut where a longer one is not found; tolerance,
+    rad or m: of the goal; turn, rad: largest rotation of the base in the rollout that verifies."""
 
     degree: int = 4
     starts: int = 6
     scatter: float = 1.0
     iterations: int = 80
-    steps: int = 160
+    steps: int = 40
+    pieces: int = 8
     tolerance: float = 1e-8
     turn: float = 1e-6
 
@@ -102,22 +109,61 @@ def zero_reaction_manoeuvre(
         )
         return Manoeuvre(ManoeuvreCode.NO_NULL_SPACE, text, None, apart, np.nan, Reach(0, 0))
     key = jax.random.PRNGKey(0) if key is None else key
+    pieces, nearest = 1, np.inf
+    while pieces <= settings.pieces:
+        stops = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (goal - start)
+        ways = []
+        for here, there in itertools.pairwise(stops):
+            way, error = _piece(robot, jnp.asarray(rows), here, there, settings, steps, key)
+            if way is None:
+                break
+            ways.append(way)
+        else:
+            path = _joined(ways, float(duration))
+            return _judged(robot, path, goal, settings)
+        nearest = min(nearest, error) if pieces == 1 else nearest
+        pieces *= 2
+    return _none(reach_of(robot, rows, postures), robot.num_joints, nearest, settings)
+
+
+def _piece(
+    robot: Robot,
+    rows: Array,
+    start: np.ndarray,
+    goal: np.ndarray,
+    settings: ManoeuvreSettings,
+    steps: int,
+    key: Array,
+) -> tuple[tuple[Array, Array, Array] | None, float]:
+    """Samples of a path as `_sampled` gives them, None if none is found, and the nearest arrival."""
     shape = (settings.starts, robot.num_joints, settings.degree + 1)
     # The first goes straight, as far as the null space lets it.
     first = settings.scatter * jax.random.normal(key, shape).at[0].set(0.0)
     first = first.at[:, :, 0].add(goal - start)
-    given = robot, jnp.asarray(rows), jnp.asarray(start)
-    found = _search(*given, jnp.asarray(goal), first, settings.iterations, steps)
-    coefficients, errors, lengths = (np.asarray(x) for x in found)
+    given = robot, rows, jnp.asarray(start)
+    coefficients, errors, lengths = _search(*given, jnp.asarray(goal), first, settings.iterations, steps)
     errors = np.where(np.isfinite(errors), errors, np.inf)
     arrived = errors <= settings.tolerance
     if not np.any(arrived):
-        reach = reach_of(robot, rows, postures)
-        return _none(reach, robot.num_joints, float(np.min(errors)), settings)
+        return None, float(np.min(errors))
     best = int(np.argmin(np.where(arrived, lengths, np.inf)))
-    q, qd, qdd = _sampled(*given, jnp.asarray(coefficients[best]), steps)
-    path = SampledPath(q, qd / duration, qdd / duration**2, jnp.asarray(float(duration)))
-    return _judged(robot, path, float(errors[best]), settings)
+    # Finer steps: between its samples a path is only as still as they are consistent with each other.
+    polished, missed, _ = _search(
+        *given, jnp.asarray(goal), coefficients[best][None], _POLISHING, _FINER * steps
+    )
+    if not missed[0] <= settings.tolerance:
+        return None, float(missed[0])
+    return _sampled(*given, polished[0], _FINER * steps), float(missed[0])
+
+
+def _joined(ways: list[tuple[Array, Array, Array]], duration: float) -> SampledPath:
+    """Ways in a row, at rest between, each taking the same share of the duration, s."""
+    rate = len(ways) / duration
+    positions, rates, accelerations = (
+        jnp.concatenate([x[: None if k == len(ways) - 1 else -1] for k, x in enumerate(part)])
+        for part in zip(*ways, strict=True)
+    )
+    return SampledPath(positions, rate * rates, rate**2 * accelerations, jnp.asarray(duration))
 
 
 def _window(s: Scalar) -> Scalar:
@@ -207,10 +253,17 @@ def _sampled(
     return path, *jax.vmap(both)(path, jnp.linspace(0.0, 1.0, steps + 1))
 
 
-def _judged(robot: Robot, path: SampledPath, error: float, settings: ManoeuvreSettings) -> Manoeuvre:
-    """The path with what a rollout and the robot's limits say of it."""
+@partial(jit, static_argnames="steps")
+def _followed(robot: Robot, path: SampledPath, steps: int) -> Motion:
+    """The path in a rollout under no momentum, which knows the joints' motion only."""
     still = State(jnp.zeros(3), jnp.array([1.0, 0.0, 0.0, 0.0]), path.joint_position[0])
-    motion = jit(lambda path: rollout(robot, path, still, num_steps=2 * settings.steps))(path)
+    return rollout(robot, path, still, num_steps=steps)
+
+
+def _judged(robot: Robot, path: SampledPath, goal: np.ndarray, settings: ManoeuvreSettings) -> Manoeuvre:
+    """The path with what a rollout and the robot's limits say of it."""
+    error = float(np.max(np.abs(np.asarray(path.joint_position[-1]) - goal)))
+    motion = _followed(robot, path, 2 * (len(path.joint_position) - 1))
     turns = np.linalg.norm(jax.vmap(quaternion_to_rotation_vector)(motion.base_quaternion), axis=-1)
     turn = float(np.max(turns))
     q, rate = np.asarray(motion.joint_grid.joint_position), np.asarray(motion.joint_grid.joint_velocity)
@@ -264,7 +317,7 @@ def _none(reach: Reach, joints: int, error: float, settings: ManoeuvreSettings) 
         code, text = (
             ManoeuvreCode.NOT_FOUND,
             (
-                f"none was found from {settings.starts} starts, though one may exist: {of} span all {joints} "
+                f"none was found from {settings.starts} starts and in up to {settings.pieces} pieces, though one may exist: {of} span all {joints} "
                 f"dimensions; {nearest}; raise starts, degree or iterations, or go by a posture between"
             ),
         )

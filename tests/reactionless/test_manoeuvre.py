@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -16,7 +18,7 @@ from jffsr.reactionless.manoeuvre_space import coupling_in_base, coupling_rows, 
 
 PLANAR = jffsr.load_robot("ye_2019_planar3")
 START, GOAL = np.array([0.3, -0.5, 0.7]), np.array([0.6, -0.2, 0.9])
-SMALL = ManoeuvreSettings(degree=3, starts=2, iterations=40, steps=160)
+SMALL = ManoeuvreSettings(degree=3, starts=2, iterations=40, steps=40, pieces=1)
 
 
 @pytest.fixture(scope="module")
@@ -57,11 +59,41 @@ def test_mujoco_sees_no_angular_momentum_with_the_base_still(found):
     assert worst < 1e-5 * largest
 
 
+def test_limits_are_looked_at(found):
+    """Ranges and rates that the way does not keep; of rates, the duration that would do."""
+    fastest = float(np.abs(found.path.joint_velocity).max())
+    slow = replace(PLANAR, limits=jffsr.Limits.symmetric(3, velocity=0.5 * fastest))
+    again = zero_reaction_manoeuvre(slow, START, GOAL, 30.0, SMALL)
+    assert again.code is ManoeuvreCode.LIMITS_EXCEEDED
+    assert "as fast as it may be" in again.sentence
+    narrow = replace(PLANAR, limits=jffsr.Limits.symmetric(3, position=0.75))
+    outside = zero_reaction_manoeuvre(narrow, START, GOAL, 30.0, SMALL)
+    assert outside.code is ManoeuvreCode.LIMITS_EXCEEDED
+    assert "leaves its range" in outside.sentence
+
+
+@pytest.mark.slow
+def test_seven_axes_in_space():
+    """All joints by 5 to 20 deg, in one piece or more; the base, free to turn, hardly does."""
+    robot = jffsr.load_robot("servicer_7dof")
+    start = np.deg2rad([0.0, -60.0, 0.0, 45.0, 0.0, -15.0, 0.0])
+    goal = np.deg2rad([20.0, -50.0, 10.0, 60.0, -20.0, -5.0, 10.0])
+    settings = ManoeuvreSettings(starts=4, steps=20, iterations=120)
+    found = zero_reaction_manoeuvre(robot, start, goal, 120.0, settings)
+    assert found.success, found.sentence
+    assert found.end_error < 1e-8
+    # Moved straight from one to the other, the joints turn it by some tenths of a degree.
+    line = jffsr.Polynomial.between(start, goal, 120.0)
+    still = jffsr.State(jnp.zeros(3), jnp.array([1.0, 0, 0, 0]), start)
+    turned = jax.jit(lambda: jffsr.rollout(robot, line, still).base_quaternion[-1])()
+    assert 2 * np.linalg.norm(turned[1:]) > 1e4 * found.turn
+
+
 @pytest.mark.slow
 def test_two_planar_joints_move_on_a_curve():
     """One rate without reaction: other postures of its curve can be reached, and no others, which is said."""
     robot = jffsr.load_robot("hu_2011_planar2")
-    settings = ManoeuvreSettings(degree=1, starts=1, iterations=15, steps=12)
+    settings = ManoeuvreSettings(degree=1, starts=1, iterations=15, steps=12, pieces=2)
     off = zero_reaction_manoeuvre(robot, [0.3, -0.5], [-0.3, 0.9], 20.0, settings)
     assert off.code is ManoeuvreCode.ON_A_SURFACE
     assert off.path is None
