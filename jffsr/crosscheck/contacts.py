@@ -13,30 +13,18 @@ from typing import Any
 import numpy as np
 
 from jffsr.clearance.model import ClearanceModel
-from jffsr.clearance.pairs import TARGET
 from jffsr.clearance.poses import body_poses
+from jffsr.crosscheck.beside_target import Contact, follow_beside_target
 from jffsr.crosscheck.compare import attitude_difference
 from jffsr.crosscheck.contact_model import to_contact_model
-from jffsr.crosscheck.drive import Drive, check_x64, commanded_acceleration, joint_torque, make_drive
+from jffsr.crosscheck.drive import check_x64, make_drive
 from jffsr.crosscheck.fine_motion import check_momentum, check_positive, fine_motion
-from jffsr.crosscheck.mujoco_model import BASE_COORDINATES, BASE_VELOCITIES, body_name, rotation_quaternion
+from jffsr.crosscheck.mujoco_model import BASE_COORDINATES, rotation_quaternion
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.rollout import check_duration
 from jffsr.trajectories.interface import Trajectory
-
-
-@dataclass(frozen=True)
-class Contact:
-    """Two bodies that touched: `pair`, the time of the first touch, s, and the deepest overlap, m."""
-
-    pair: tuple[str, str]
-    time: float
-    depth: float
-
-    def __str__(self) -> str:
-        return f"{' and '.join(self.pair)} touch at {self.time:.4g} s, {self.depth:.3g} m deep"
 
 
 @dataclass(frozen=True)
@@ -95,7 +83,7 @@ def check_contacts(
     drive = make_drive(robot, trajectory, initial_state, np.asarray(motion.time, float), step, momentum)
     model = to_contact_model(robot, clearance, drive.step, target)
     first = None if target is None else target_motion(begin)
-    contacts, data, tracking = _follow(robot, model, drive, first)
+    contacts, data, tracking = follow_beside_target(robot, model, drive, first)
     index = robot.end_effector_index(end_effector)
     ours = _tool(robot, index, motion)
     site = data.site(robot.end_effector_names[index])
@@ -117,48 +105,6 @@ def check_contacts(
         target_attitude=apart[1],
         tracking=tracking,
     )
-
-
-def _follow(
-    robot: Robot, model: Any, drive: Drive, first: Any | None
-) -> tuple[tuple[Contact, ...], Any, float]:
-    """What touched, MuJoCo's data at the end, and the largest error of a joint."""
-    import mujoco
-
-    data = mujoco.MjData(model)
-    pose, rate = [drive.qpos], [drive.qvel]
-    if first is not None:
-        pose += [np.asarray(first.position), np.asarray(first.quaternion)]
-        rate += [np.asarray(first.velocity), np.asarray(first.angular_velocity_T)]
-    data.qpos[:], data.qvel[:] = np.concatenate(pose), np.concatenate(rate)
-    n, joints = robot.num_joints, slice(BASE_COORDINATES, BASE_COORDINATES + robot.num_joints)
-    own = slice(0, BASE_VELOCITIES + n)
-    inertia = np.zeros((model.nv, model.nv))
-    names = {model.body(body_name(name)).id: name for name in robot.body_names}
-    if first is not None:
-        names[model.body(TARGET).id] = TARGET
-    touched: dict[tuple[str, str], tuple[float, float]] = {}
-    error, total = 0.0, len(drive.mean_acceleration)
-    for k in range(total + 1):
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        for contact in data.contact[: data.ncon]:
-            pair = tuple(names[b] for b in sorted(model.geom_bodyid[contact.geom]))
-            if contact.dist <= 0:
-                time, depth = touched.get(pair, (k * drive.step, 0.0))
-                touched[pair] = time, max(depth, -contact.dist)
-        position_error = drive.joint_position[k] - data.qpos[joints]
-        error = np.maximum(error, np.abs(position_error).max())
-        if k == total:
-            break
-        rate_error = drive.joint_velocity[k] - data.qvel[BASE_VELOCITIES : own.stop]
-        wanted = commanded_acceleration(drive.step, drive.mean_acceleration[k], position_error, rate_error)
-        mujoco.mj_fullM(model, data, inertia)
-        data.ctrl[:] = joint_torque(np, inertia[own, own], data.qfrc_bias[own], wanted)
-        mujoco.mj_forwardSkip(model, data, mujoco.mjtStage.mjSTAGE_VEL, 1)
-        mujoco.mj_RungeKutta(model, data, 4)
-    contacts = [Contact(pair, float(time), float(depth)) for pair, (time, depth) in touched.items()]
-    return tuple(sorted(contacts, key=lambda contact: contact.time)), data, float(error)
 
 
 def _tool(robot: Robot, index: int, motion: Any) -> tuple[np.ndarray, np.ndarray]:

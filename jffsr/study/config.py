@@ -15,16 +15,20 @@ from jffsr.reading.complaints import complaint
 from jffsr.reading.did_you_mean import hint, listed
 from jffsr.reading.sources import Sources
 from jffsr.study.capture.schema import CaptureConfig
+from jffsr.study.chain.schema import ChainConfig
 from jffsr.study.composition import compose
 from jffsr.study.lookup import find_config
+from jffsr.study.reactionless.schema import ReactionlessConfig
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.tracking.schema import TrackingConfig
 
-Study = PlanningConfig | TrackingConfig | CaptureConfig
+Study = PlanningConfig | TrackingConfig | CaptureConfig | ReactionlessConfig | ChainConfig
 KINDS: dict[str, type[Study]] = {
     "planning": PlanningConfig,
     "tracking": TrackingConfig,
     "capture": CaptureConfig,
+    "reactionless": ReactionlessConfig,
+    "chain": ChainConfig,
 }
 
 _KINDS = listed(f"'{kind}'" for kind in KINDS)

@@ -17,21 +17,27 @@ _RUNNERS = {
     "planning": "jffsr.study.planning:run_planning",
     "tracking": "jffsr.study.tracking.running:run_tracking",
     "capture": "jffsr.study.capture.running:run_capture",
+    "reactionless": "jffsr.study.reactionless.running:run_reactionless",
+    "chain": "jffsr.study.chain.running:run_chain",
 }
 _TEXTS = {
     "planning": "jffsr.study.summary:summary_text",
     "tracking": "jffsr.study.tracking.summary:summary_text",
     "capture": "jffsr.study.capture.summary:summary_text",
+    "reactionless": "jffsr.study.reactionless.summary:summary_text",
+    "chain": "jffsr.study.chain.summary:summary_text",
 }
 _CHECKS = {
     "planning": "jffsr.study.reviewing:check_run",
     "tracking": "jffsr.study.tracking.reviewing:check_tracking",
     "capture": "jffsr.study.capture.reviewing:check_run",
+    "reactionless": "jffsr.study.reactionless.reviewing:check_run",
+    "chain": "jffsr.study.chain.reviewing:check_run",
 }
 
 
 def run_study(config: Study, out: str | Path | None, say: Callable[[str], None] = lambda text: None) -> Run:
-    """Run a study of any kind in its folder; see `run_planning`, `run_tracking` and `run_capture`."""
+    """Run a study of any kind in its folder; see `run_planning` and its neighbours."""
     return _loaded(_RUNNERS[config.kind])(config, out, say=say)
 
 

@@ -46,10 +46,9 @@ def plan(
     elif overrides:
         raise InputError("overrides go with a configuration's path or name, not with a loaded one")
     if not isinstance(config, PlanningConfig):
-        call = {"tracking": "jffsr.track", "capture": "jffsr.plan_capture"}[config.kind]
-        raise InputError(
-            f"{config.where('kind')}: found '{config.kind}'; use 'jffsr run', or {call} in Python"
-        )
+        call = {"tracking": "jffsr.track", "capture": "jffsr.plan_capture"}.get(config.kind)
+        instead = "" if call is None else f", or {call} in Python"
+        raise InputError(f"{config.where('kind')}: found '{config.kind}'; use 'jffsr run'{instead}")
     return _solve(config, build_problem(config))
 
 

@@ -30,36 +30,37 @@ RANK_CUT = 1e-12
 
 
 @jax.custom_jvp
-def inverse_and_values(jacobian: Matrix, damping: Damping) -> tuple[Matrix, Vector]:
+def inverse_and_values(jacobian: Matrix, damping: Damping, cut: float = RANK_CUT) -> tuple[Matrix, Vector]:
     """`filtered_inverse` and `singular_values` of a matrix (m, n) by one decomposition."""
     u, sigma, v = singular_bases(jacobian)
-    kept = _kept(sigma, damping)
+    kept = _kept(sigma, damping, cut)
     value = (v * jnp.where(kept, gain(jnp.where(kept, sigma, 1.0), damping), 0.0)) @ u.T
     return value, in_descending_order(sigma)
 
 
-def filtered_inverse(jacobian: Matrix, damping: Damping) -> Matrix:
+def filtered_inverse(jacobian: Matrix, damping: Damping, cut: float = RANK_CUT) -> Matrix:
     """V g(Sigma) U' (n, m) of a matrix (m, n), with g(s) = s/(s^2 + lambda(s)^2), zero for undamped zero values.
 
-    Without damping it is the Moore-Penrose inverse. Its derivative is right and finite at repeated singular values
-    and, where there is damping, at zero ones; first derivatives only.
+    Undamped values below `cut` of the largest count as zero. Without damping it is the Moore-Penrose inverse. Its
+    derivative is right and finite at repeated singular values and, where there is damping, at zero ones; first
+    derivatives only.
     """
-    return inverse_and_values(jacobian, damping)[0]
+    return inverse_and_values(jacobian, damping, cut)[0]
 
 
-def _kept(sigma: Vector, damping: Damping) -> Array:
-    """Which singular values are answered: all that are damped, and of the others those above rounding."""
-    rounding = RANK_CUT * jnp.max(sigma)
+def _kept(sigma: Vector, damping: Damping, cut: float) -> Array:
+    """Which singular values are answered: all that are damped, and of the others those above the cut."""
+    rounding = cut * jnp.max(sigma)
     return (sigma > rounding) | (damping_of(sigma, damping) > rounding)
 
 
 @inverse_and_values.defjvp
 def _inverse_and_values_jvp(primals, tangents):
-    (jacobian, damping), (jacobian_dot, damping_dot) = primals, tangents
+    (jacobian, damping, cut), (jacobian_dot, damping_dot, _) = primals, tangents
     # Whole bases, also where a singular value is zero.
     u, sigma, vh = jnp.linalg.svd(jacobian, full_matrices=False)
     v = vh.T
-    kept = _kept(sigma, damping)
+    kept = _kept(sigma, damping, cut)
     safe = jnp.where(kept, sigma, 1.0)
     value = jnp.where(kept, gain(safe, damping), 0.0)
     # g(s)/s, which does not need s to differ from zero.

@@ -49,6 +49,16 @@ class SecondaryTask(Protocol):
     ) -> tuple[Vector, Matrix]: ...
 
 
+def limit_gradient(robot: Robot, joint_position: Vector) -> Vector:
+    """Gradient (n,) of the mean of ((q - mid)/half range)^2/2 over the joints; zero for joints without limits."""
+    limits, q = robot.limits, joint_position
+    lower, upper = jnp.asarray(limits.position_lower), jnp.asarray(limits.position_upper)
+    bounded = jnp.isfinite(lower) & jnp.isfinite(upper)
+    half = jnp.where(bounded, 0.5 * (upper - lower), 1.0)
+    middle = jnp.where(bounded, 0.5 * (upper + lower), q)
+    return (q - middle) / (half**2 * q.size)
+
+
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class JointLimitAvoidance:
@@ -63,12 +73,9 @@ class JointLimitAvoidance:
         self, situation: Situation, rates: Vector, space: Matrix, damping: Damping
     ) -> tuple[Vector, Matrix]:
         """The rates with the projected gradient added; the whole space is left."""
-        limits, q = situation.robot.limits, situation.state.joint_position
-        lower, upper = jnp.asarray(limits.position_lower), jnp.asarray(limits.position_upper)
-        bounded = jnp.isfinite(lower) & jnp.isfinite(upper)
-        half = jnp.where(bounded, 0.5 * (upper - lower), 1.0)
-        middle = jnp.where(bounded, 0.5 * (upper + lower), q)
-        return rates - self.gain * (space @ ((q - middle) / (half**2 * q.size))), space
+        return rates - self.gain * (
+            space @ limit_gradient(situation.robot, situation.state.joint_position)
+        ), space
 
 
 @jax.tree_util.register_dataclass

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from jffsr.study.capture.schema import CaptureConfig
+from jffsr.study.chain.schema import ChainConfig
+from jffsr.study.reactionless.schema import ReactionlessConfig
 from jffsr.study.reviewing import open_run, open_tracking
 from jffsr.study.run_folder import RunFolder
 from jffsr.study.tracking.schema import TrackingConfig
@@ -18,6 +20,19 @@ def draw_run(path: str | Path, kinds: Sequence[str] = KINDS) -> list[Path]:
     kinds are of "png" and "pdf".
     """
     config = RunFolder(Path(path)).read_config()
+    if isinstance(config, ChainConfig):
+        from jffsr.study.chain.reviewing import open_chain
+        from jffsr.viz.chain import save_chain_figures
+
+        folder, study, plan, observation, dataset = open_chain(path)
+        shown = study.robot, study.geometry, plan, observation, dataset
+        return save_chain_figures(*shown, config.hold.base_rate, folder.figures, kinds)
+    if isinstance(config, ReactionlessConfig):
+        from jffsr.study.reactionless.reviewing import open_runs
+        from jffsr.viz.reactionless import save_reactionless_figures
+
+        folder, robot, dataset = open_runs(path)
+        return save_reactionless_figures(robot, dataset, config.hold.base_rate, folder.figures, kinds)
     if isinstance(config, CaptureConfig):
         from jffsr.study.capture.reviewing import open_capture
         from jffsr.viz.capture import save_capture_figures

@@ -20,13 +20,19 @@ def test_a_capture_that_was_found_is_made_better(monkeypatch):
     problem, free = planar_capture(48)
     result = CaptureResult(CaptureCode.CAPTURED, "captured")
     found = SimpleNamespace(
-        problems=[problem], free=free[None], attempts=np.ones(1, int), result=lambda number: result
+        problems=[problem],
+        free=free[None],
+        attempts=np.ones(1, int),
+        jacobians=np.full(1, 5),
+        result=lambda number: result,
     )
     monkeypatch.setattr(planner, "plan_captures", lambda *args, **keywords: found)
     path, settings = problem.constraints[0].path, CaptureSettings(num_steps=48)
     plan = jffsr.plan_capture(problem.robot, path, problem.initial_state, None, settings)
     assert plan.result.success
     assert plan.problem.num_steps == 2 * 48
+    # What was spent on the way to the first plan counts.
+    assert plan.jacobians > 5
     # The base is displaced by what the arm's end leaves open, and turned by the way: 0.1648 as the arm went first.
     np.testing.assert_allclose(plan.before, 0.16479, atol=1e-5)
     # A valley with a floor near by; the captures of the benchmark halve it.

@@ -133,6 +133,7 @@ def test_the_best_of_several_frames_is_confirmed_by_the_floating_base(servicer):
     assert np.linalg.norm(away - position) > 1e-2
 
 
+@pytest.mark.slow
 def test_a_point_that_the_arm_cannot_reach_is_not_confirmed(servicer):
     robot, state = servicer
     motion = moving({"grasp": GRASP}, position=(6.0, 0.0, -0.5))

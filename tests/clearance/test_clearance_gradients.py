@@ -15,21 +15,22 @@ from jffsr.clearance.model import ClearanceModel
 from jffsr.clearance.solids import solid_of
 from jffsr.robots.robot import Topology
 
-KINDS = ("box", "capsule", "box", "cylinder", "sphere")
-COUNT = len(KINDS)
+FEW = ("box", "capsule", "cylinder")
+ALL = ("box", "capsule", "box", "cylinder", "sphere")
 
 
 class FreeBodies:
-    """Five free bodies; every pair of them is compared."""
+    """Free bodies of these kinds; every pair of them is compared."""
 
-    def __init__(self):
+    def __init__(self, kinds):
+        self.count = count = len(kinds)
         generator = np.random.default_rng(1)
-        names = tuple(f"body{k}" for k in range(COUNT))
+        names = tuple(f"body{k}" for k in range(count))
         # A second shape on one body, so that the nearest of several is taken.
-        solids = {k: [solid_of(random_shape(kind, generator), k, False)] for k, kind in enumerate(KINDS)}
+        solids = {k: [solid_of(random_shape(kind, generator), k, False)] for k, kind in enumerate(kinds)}
         solids[1].append(solid_of(random_shape("box", generator), 1, False))
         topology = Topology("free", (), (), (), names, (), ())
-        self.model = ClearanceModel.of_solids(topology, solids, list(combinations(range(COUNT), 2)))
+        self.model = ClearanceModel.of_solids(topology, solids, list(combinations(range(count), 2)))
 
         def change(position, rotation, shift, turn):
             def moved(share):
@@ -48,20 +49,20 @@ class FreeBodies:
         return (moved(step) - moved(-step)) / (2 * step)
 
 
-@pytest.fixture(scope="module")
-def bodies() -> FreeBodies:
-    return FreeBodies()
+@pytest.fixture(scope="module", params=[FEW, pytest.param(ALL, marks=pytest.mark.slow)], ids=["few", "all"])
+def bodies(request) -> FreeBodies:
+    return FreeBodies(request.param)
 
 
-def directions(count: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    return generator.normal(size=(count, COUNT, 3)), generator.normal(size=(count, COUNT, 3))
+def directions(samples: int, count: int, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    return generator.normal(size=(samples, count, 3)), generator.normal(size=(samples, count, 3))
 
 
 def test_derivatives_are_those_of_the_distance(bodies):
-    generator = np.random.default_rng(2)
-    position = generator.uniform(-1, 1, (400, COUNT, 3))
-    rotation = Rotation.random(400 * COUNT, random_state=generator).as_matrix().reshape(400, COUNT, 3, 3)
-    shift, turn = directions(400, generator)
+    generator, count = np.random.default_rng(2), bodies.count
+    position = generator.uniform(-1, 1, (400, count, 3))
+    rotation = Rotation.random(400 * count, random_state=generator).as_matrix().reshape(400, count, 3, 3)
+    shift, turn = directions(400, count, generator)
     value, change = bodies.changes(position, rotation, shift, turn)
     np.testing.assert_allclose(value, bodies.model(position, rotation), rtol=0, atol=1e-13)
     fine, coarse = (bodies.differences(position, rotation, shift, turn, step) for step in (1e-6, 4e-6))
@@ -82,19 +83,19 @@ def test_reverse_mode_gives_the_same():
     np.testing.assert_allclose(np.ravel(gradient), expected, rtol=0, atol=1e-7)
 
 
-def special_places() -> np.ndarray:
+def special_places(count: int) -> np.ndarray:
     """All in one place; in a row along an axis; touching, nearly touching; far apart."""
-    row = np.arange(COUNT)[:, None] * np.eye(3)[[0]]
+    row = np.arange(count)[:, None] * np.eye(3)[[0]]
     return np.stack([0 * row, 0.3 * row, 0.6 * row[:, ::-1], row[:, [1, 0, 2]], 1e6 * row, 1e-13 * row])
 
 
 def test_finite_where_bodies_are_concentric_parallel_or_far_away(bodies):
-    generator = np.random.default_rng(4)
-    places = special_places()
+    generator, count = np.random.default_rng(4), bodies.count
+    places = special_places(count)
     position = np.repeat(places, 400 // len(places) + 1, axis=0)[:400]
-    quarter = Rotation.from_rotvec(np.pi / 2 * generator.integers(-1, 2, (400 * COUNT, 3))).as_matrix()
-    rotation = quarter.reshape(400, COUNT, 3, 3)
-    value, change = bodies.changes(position, rotation, *directions(400, generator))
+    quarter = Rotation.from_rotvec(np.pi / 2 * generator.integers(-1, 2, (400 * count, 3))).as_matrix()
+    rotation = quarter.reshape(400, count, 3, 3)
+    value, change = bodies.changes(position, rotation, *directions(400, count, generator))
     assert np.all(np.isfinite(value))
     assert np.all(np.isfinite(change))
     # No distance changes faster than the bodies' nearest points can move.
@@ -104,11 +105,11 @@ def test_finite_where_bodies_are_concentric_parallel_or_far_away(bodies):
 
 def test_depth_is_continuous(bodies):
     """Along straight ways through each other no distance jumps, whichever rule is in force."""
-    generator = np.random.default_rng(5)
-    rotation = Rotation.random(COUNT, random_state=generator).as_matrix()
-    start, end = generator.uniform(-1, 1, (2, COUNT, 3))
+    generator, count = np.random.default_rng(5), bodies.count
+    rotation = Rotation.random(count, random_state=generator).as_matrix()
+    start, end = generator.uniform(-1, 1, (2, count, 3))
     share = np.linspace(0, 1, 20_001)[:, None, None]
-    value = bodies.model(start + share * (end - start), np.broadcast_to(rotation, (20_001, COUNT, 3, 3)))
+    value = bodies.model(start + share * (end - start), np.broadcast_to(rotation, (20_001, count, 3, 3)))
     fastest = np.linalg.norm((end - start)[:, None] - (end - start)[None], axis=-1).max()
     steps = np.abs(np.diff(value, axis=0))
     assert value.min() < -0.1

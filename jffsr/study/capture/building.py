@@ -38,7 +38,7 @@ from jffsr.types import Array
 _T = TypeVar("_T")
 # Printed quaternions are rounded; farther from unit length they are told of, still farther refused.
 _ROUNDED, _MISTAKEN = 1e-3, 5e-2
-_STEPS = 8
+_STEPS = 64
 _BEYOND = 1.0
 """s that the target's motion goes on after the window."""
 

@@ -28,7 +28,8 @@ class ObservedTarget:
 
     target has its shapes in `geometry` and its axes are the marker's; motion begins at the estimate, so that the robot
     starts at its time `age`; exposures, of which `seen` gave a pose; of those after the acquisition (`filtered`) the
-    filter believed in `used`; lost, whether it has lost the track; tolerances of the prediction.
+    filter believed in `used`; lost, whether it has lost the track; tolerances of the prediction; measurements and
+    course, every pose and every estimate, by a clock that began at `started` of the robot's, s.
     """
 
     estimate: TargetEstimate
@@ -42,6 +43,9 @@ class ObservedTarget:
     used: int
     lost: bool
     tolerances: ConvergenceTolerances
+    measurements: Measurements
+    course: FilteredTarget
+    started: float
 
     def path(self, grasp: str) -> GraspPath:
         """Where the grasp frame is predicted to be, by the robot's time."""
@@ -90,6 +94,9 @@ def observe(study: CaptureStudy, section: Observation, last: float) -> ObservedT
             wanted.si("angular_velocity"),
             wanted.confidence,
         ),
+        jax.device_get(measurements),
+        course,
+        -(age + before),
     )
 
 

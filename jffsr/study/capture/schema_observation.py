@@ -15,7 +15,7 @@ NotNegative = Annotated[float, number(ge=0)]
 Share = Annotated[float, number(ge=0, lt=1)]
 
 
-def _given(value, quantity: str, degrees: float):
+def given_in_degrees(value, quantity: str, degrees: float):
     """The mapping with a quantity that is not given written out in degrees, which people read."""
     if isinstance(value, dict) and value.get(quantity) is None and value.get(f"{quantity}_deg") is None:
         return {**value, f"{quantity}_deg": degrees}
@@ -40,7 +40,7 @@ class Camera(Section):
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        return _given(value, "attitude_deviation", 2.0)
+        return given_in_degrees(value, "attitude_deviation", 2.0)
 
     @model_validator(mode="after")
     def _check(self) -> Camera:
@@ -66,7 +66,7 @@ class Prior(Section):
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        return _given(value, "angular_velocity_deviation", 2.5)
+        return given_in_degrees(value, "angular_velocity_deviation", 2.5)
 
     @model_validator(mode="after")
     def _check(self) -> Prior:
@@ -91,7 +91,7 @@ class Convergence(Section):
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        value = _given(value, "attitude", 2.0)
+        value = given_in_degrees(value, "attitude", 2.0)
         no_rate = isinstance(value, dict) and all(
             value.get(key) is None for key in ("angular_velocity", "angular_velocity_deg")
         )

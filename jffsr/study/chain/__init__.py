@@ -1,0 +1,1 @@
+"""The whole chain: a tumbling target seen, predicted, reached, grasped, and the base then held still."""
