@@ -26,6 +26,7 @@ from experiments.reactionless.control_runs import (
     STROKE,
     by_period,
     curves,
+    integral_gains,
     loops,
     machines,
     numbers,
@@ -71,6 +72,7 @@ def measured(seeds: int, evaluations: int, kept: Path | None) -> list[dict]:
             if (scene, name) == (SIMULATION, SSADE):
                 facts["mujoco"] = on_mujoco(weights, run)
     facts["training"] = training_values(weights)
+    facts["gain"] = integral_gains(weights)
     facts["periods"] = list(by_period(PERIODS))
     return [facts, shown, *rows]
 

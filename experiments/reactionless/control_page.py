@@ -42,7 +42,7 @@ def tables(facts: dict, rows: list[dict]) -> str:
     parts = [_about(facts)]
     for scene, title in TITLES.items():
         parts += [f"## {title}", _table(scene, [row for row in rows if row["scene"] == scene])]
-    parts += ["## On the training runs", _training(facts["training"])]
+    parts += ["## The machines themselves", _machines(facts["training"], facts["gain"])]
     parts += ["## SSADE-ELM against the others, seed by seed", _duels(rows)]
     parts += ["## MuJoCo as the plant", _mujoco(facts["mujoco"])]
     parts += ["## Sampling", _periods(facts["periods"])]
@@ -84,9 +84,12 @@ def _table(scene: str, rows: list[dict]) -> str:
     return "\n".join(lines)
 
 
-def _training(values: dict[str, float]) -> str:
-    lines = ["| machine | rms on the training runs [rad], median |", "|---|---|"]
-    lines += [f"| {name} | {value:.4g} |" for name, value in values.items()]
+def _machines(training: dict[str, float], gain: dict[str, float]) -> str:
+    lines = [
+        "| machine | rms on the training runs [rad] | sum of h^2, its integral gain [1/s] |",
+        "|---|---|---|",
+    ]
+    lines += [f"| {name} | {value:.4g} | {gain[name]:.1f} |" for name, value in training.items()]
     return "\n".join(lines)
 
 
@@ -144,7 +147,7 @@ def _periods(rows: list[dict]) -> str:
 @styled
 def draw_errors(shown: dict, path: Path) -> None:
     """Joint errors over time, one panel a joint: the paper's Fig. 8."""
-    names = (PD, ELM, PSO, SSADE, COMPUTED, PASSIVITY)
+    names = (PD, ELM, PSO, SSADE, ONES, COMPUTED, PASSIVITY)
     figure = new_figure(5.2, 6.5)
     panels = figure.subplots(3, 1, sharex=True)
     handles = []
@@ -154,8 +157,11 @@ def draw_errors(shown: dict, path: Path) -> None:
             (line,) = axes.plot(curve["time"], 1e3 * np.array(curve["error"][joint]), **line_look(index))
             handles += [line] if joint == 0 else []
         axes.set_ylabel(f"joint {joint + 1}\nerror [mrad]")
-        axes.set_yscale("symlog", linthresh=10.0)
+        if joint > 0:
+            axes.set_yscale("symlog", linthresh=10.0)
+            axes.set_yticks([-10, 0, 10, 100], ["-10", "0", "10", "100"])
         axes.axhline(0.0, color="0.8", linewidth=0.5, zorder=0)
+    figure.align_ylabels()
     panels[-1].set_xlabel("time [s]")
     panels[-1].set_xlim(0, curve["time"][-1])
     legend_above(figure, handles, list(names))
@@ -174,6 +180,7 @@ def draw_momentum(shown: dict, path: Path) -> None:
         (line,) = upper.plot(curve["time"], curve["momentum"], **line_look(index))
         lower.plot(curve["time"], 1e3 * np.array(curve["base_rate"]), **line_look(index))
         handles.append(line)
+    figure.align_ylabels()
     upper.set_ylabel("angular momentum\n[N m s]")
     lower.set_ylabel("base rate\n[mrad/s]")
     lower.set_xlabel("time [s]")

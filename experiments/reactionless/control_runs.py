@@ -21,12 +21,14 @@ from jffsr.reactionless.control.extreme_learning import HIDDEN, INPUTS, ExtremeL
 from jffsr.reactionless.control.passivity import PassivityBased
 from jffsr.reactionless.control.proportional_derivative import ProportionalDerivative
 from jffsr.reactionless.control.training import MachineTraining, train_machine
+from jffsr.reactionless.interface import Desired
 from jffsr.reactionless.plant import closed_loop
 from jffsr.reactionless.plant_mujoco import closed_loop_mujoco
 from jffsr.reactionless.plant_run import LoopRun
 from jffsr.reactionless.plant_settings import JointDisturbance, LoopSettings, Strike
 from jffsr.reactionless.plant_strike import Pendulum
 from jffsr.robots.state import State
+from jffsr.types import Array
 
 PERIOD, DURATION = 0.01, 20.0
 SAMPLES = int(DURATION / PERIOD)
@@ -82,6 +84,21 @@ def training_values(weights: dict[str, np.ndarray]) -> dict[str, float]:
     return {name: float(np.median(value(jnp.asarray(free)))) for name, free in weights.items()}
 
 
+def integral_gains(weights: dict[str, np.ndarray]) -> dict[str, float]:
+    """The sum of h^2 of each kind of machine, 1/s: mean over joints and the reference, median over the seeds."""
+    record = published_case(SAMPLES, PERIOD).record
+    motion = Desired(record.joint_position, record.joint_velocity, record.joint_acceleration)
+    motion = jax.tree.map(lambda leaf: leaf[::50], motion)
+
+    def gain(free: Array) -> Array:
+        machine = controller(ELM, free)
+        nodes = jax.vmap(lambda desired: machine.hidden(desired, jnp.zeros(3), jnp.zeros(3)))(motion)
+        return jnp.mean(jnp.sum(nodes**2, axis=-1))
+
+    each = jit(jax.vmap(gain))
+    return {name: float(np.median(each(jnp.asarray(free)))) for name, free in weights.items()}
+
+
 def training_problem() -> MachineTraining:
     """Loads drawn about the published one, which is not among them, and disturbances that no test has."""
     loads = jnp.asarray(drawn_loads(TRAINING_SEED, TRAINING_LOADS))
@@ -133,8 +150,7 @@ def numbers(run: LoopRun) -> Iterator[dict]:
     total = np.asarray(run.momentum)
     half = SAMPLES // 2
     for seed, error in enumerate(errors):
-        yield {
-            "seed": seed,
+        found = {
             "mean": float(error.mean()),
             "mean_later": float(error[half:].mean()),
             "rms": float(np.sqrt((error**2).mean())),
@@ -144,18 +160,19 @@ def numbers(run: LoopRun) -> Iterator[dict]:
             "base_rate": float(np.sqrt((spin[seed, half:] ** 2).mean())),
             "momentum": float(np.abs(total[seed, half - 1] - total[seed, 0]).max()),
             "torque": float(np.abs(run.torque[seed]).max()),
-            "code": int(run.code[seed]),
         }
+        rounded = {key: float(f"{value:.5g}") for key, value in found.items()}
+        yield {"seed": seed, **rounded, "code": int(run.code[seed])}
 
 
 def curves(run: LoopRun, seed: int = 0, every: int = 10) -> dict:
     """What the figures show of one run, thinned."""
     at = slice(None, None, every)
     return {
-        "time": np.asarray(run.time)[seed, at].round(4).tolist(),
-        "error": np.asarray(run.error)[seed, at].round(7).T.tolist(),
-        "base_rate": np.asarray(run.states.base_twist)[seed, at, 5].round(8).tolist(),
-        "momentum": np.asarray(run.momentum)[seed, at, 5].round(9).tolist(),
+        "time": np.asarray(run.time)[seed, at].round(2).tolist(),
+        "error": np.asarray(run.error)[seed, at].round(6).T.tolist(),
+        "base_rate": np.asarray(run.states.base_twist)[seed, at, 5].round(7).tolist(),
+        "momentum": np.asarray(run.momentum)[seed, at, 5].round(7).tolist(),
     }
 
 

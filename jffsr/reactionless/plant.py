@@ -11,7 +11,7 @@ from jffsr.dynamics.momentum import inertia_blocks, momentum
 from jffsr.reactionless.interface import Controller, Reference
 from jffsr.reactionless.plant_computer import Decision, begin, decide
 from jffsr.reactionless.plant_run import LoopRun, loop_code
-from jffsr.reactionless.plant_settings import LoopSettings, Strike
+from jffsr.reactionless.plant_settings import LoopSettings, Strike, check_loop
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.torque_step import filled_state, runge_kutta_step, state_slope
@@ -32,8 +32,9 @@ def closed_loop(
     The robot here is the truth, with its load: neither the reference nor the controller is given it. Between two
     samples torque and joint disturbance are held, and the free-floating equations of motion are integrated by
     Runge-Kutta's classical method. `key` draws noise and disturbance: one key, one run. Everything but the settings'
-    static numbers may be batched by `jax.vmap`. Raises InputError for settings that make no sense.
+    static numbers may be batched by `jax.vmap`. Raises InputError for a state or settings that do not fit the robot.
     """
+    check_loop(robot, initial_state, settings)
     step = settings.period / settings.substeps
     start = filled_state(initial_state, robot.num_joints)
 

@@ -12,7 +12,7 @@ from jffsr.reactionless.interface import Controller, Reference
 from jffsr.reactionless.plant import collected
 from jffsr.reactionless.plant_computer import begin, decide
 from jffsr.reactionless.plant_run import LoopRun
-from jffsr.reactionless.plant_settings import LoopSettings
+from jffsr.reactionless.plant_settings import LoopSettings, check_loop
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.torque_step import filled_state
@@ -37,6 +37,7 @@ def closed_loop_mujoco(
     """
     import mujoco
 
+    check_loop(robot, initial_state, settings)
     model = to_mjmodel(robot, float(settings.period) / settings.substeps)
     data = mujoco.MjData(model)
     order = branch_order(robot.topology)

@@ -9,6 +9,8 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.robots.robot import Robot
+from jffsr.robots.state import State
 from jffsr.types import Array
 
 
@@ -114,6 +116,26 @@ class LoopSettings:
         limit = self.torque_limit
         if isinstance(limit, Real | np.ndarray) and not np.all(np.asarray(limit) > 0):
             raise InputError(f"torque_limit is {limit}; positive numbers are expected")
+
+
+def check_loop(robot: Robot, initial_state: State, settings: LoopSettings) -> None:
+    """InputError where a state, a torque limit or a stroke is not of this robot's size; shapes alone are looked at."""
+    n = robot.num_joints
+    found = np.shape(initial_state.joint_position)
+    if found != (n,):
+        raise InputError(
+            f"initial_state has joint_position of shape {found}; robot '{robot.name}' has {n} joints"
+        )
+    found = np.shape(settings.torque_limit)
+    if found not in ((), (n,)):
+        raise InputError(
+            f"torque_limit has shape {found}; one number, or one for each of {n} joints, is expected"
+        )
+    if settings.strike is not None:
+        found = np.shape(settings.strike.wrench)
+        if found != (6,):
+            raise InputError(f"a strike's wrench has shape {found}; force and moment, (6,), are expected")
+        robot.end_effector_index(None)
 
 
 def _positive(name: str, value: object) -> None:

@@ -201,6 +201,20 @@ def test_settings_without_sense_are_refused(make, told):
         make()
 
 
+def test_what_does_not_fit_the_robot_is_refused(feedback):
+    def loop(state=START, **changes):
+        closed_loop(ROBOT, state, waves(5), feedback, LoopSettings(5, **changes), jax.random.key(0))
+
+    with pytest.raises(jffsr.InputError, match=r"shape \(2,\); robot 'ye_2019_planar3' has 3 joints"):
+        loop(replace(START, joint_position=np.zeros(2)))
+    with pytest.raises(jffsr.InputError, match="torque_limit has shape"):
+        loop(torque_limit=np.ones(4))
+    with pytest.raises(jffsr.InputError, match="wrench has shape"):
+        loop(strike=Strike(np.zeros(3), 0.0))
+    with pytest.raises(jffsr.InputError, match=r"gains\.slope has shape"):
+        ProportionalDerivative.of(ROBOT, POSTURE, Gains(np.ones(3), np.ones(1)))
+
+
 @pytest.mark.slow
 def test_derivatives_of_a_run_are_finite_differences():
     """Of a late joint angle, by the gains and the load's mass, through sensors, limits and the plant."""

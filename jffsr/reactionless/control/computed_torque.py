@@ -31,7 +31,7 @@ class ComputedTorque:
     @classmethod
     def of(cls, robot: Robot, gains: Gains | None = None) -> ComputedTorque:
         """For the robot without load; the published gains by default."""
-        return cls(robot, Gains.published(robot.num_joints) if gains is None else gains)
+        return cls(robot, Gains.fitting(robot, gains))
 
     def begin(self, measured: Measured) -> tuple:
         """It has no state."""

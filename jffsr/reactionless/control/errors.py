@@ -33,6 +33,18 @@ class Gains:
         first = np.arange(num_joints) == 0
         return cls(np.where(first, 100.0, 50.0), np.where(first, 2.0, 1.0))
 
+    @classmethod
+    def fitting(cls, robot: Robot, gains: Gains | None) -> Gains:
+        """The gains, None the published ones; InputError where they are not one a joint."""
+        n = robot.num_joints
+        if gains is None:
+            return cls.published(n)
+        for name in ("rate", "slope"):
+            found = np.shape(getattr(gains, name))
+            if found != (n,):
+                raise InputError(f"gains.{name} has shape {found}; robot '{robot.name}' has {n} joints")
+        return gains
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ class ExtremeLearning:
         **options: Array | float,
     ) -> ExtremeLearning:
         """For the robot without load about a posture, with input weights from `machine_weights(free)`."""
-        gains = Gains.published(robot.num_joints) if gains is None else gains
+        gains = Gains.fitting(robot, gains)
         weights, bias = machine_weights(free)
         return cls(decoupled_inertia(robot, joint_position), gains, weights, bias, **options)
 

@@ -85,8 +85,9 @@ class PassivityBased:
         start: Array | None = None,
         **options: Array | float,
     ) -> PassivityBased:
-        """For the robot without load; the published gains by default."""
-        gains = Gains.published(robot.num_joints) if gains is None else gains
+        """For the robot without load; InputError where it has no end effector or the gains do not fit."""
+        gains = Gains.fitting(robot, gains)
+        robot.end_effector_index(None)
         rates = jnp.broadcast_to(jnp.asarray(adaptation, dtype=float), (LOAD_PARAMETERS,))
         begin = jnp.zeros(LOAD_PARAMETERS) if start is None else jnp.asarray(start, dtype=float)
         return cls(robot, gains, rates, begin, **options)

@@ -26,7 +26,7 @@ class ProportionalDerivative:
     @classmethod
     def of(cls, robot: Robot, joint_position: Vector, gains: Gains | None = None) -> ProportionalDerivative:
         """For the robot without load about a posture; the published gains by default."""
-        gains = Gains.published(robot.num_joints) if gains is None else gains
+        gains = Gains.fitting(robot, gains)
         return cls(decoupled_inertia(robot, joint_position), gains)
 
     def begin(self, measured: Measured) -> tuple:
