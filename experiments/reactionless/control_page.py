@@ -12,6 +12,7 @@ from experiments.reactionless.control_runs import (
     CONTROLLERS,
     ELM,
     HIT,
+    LEARNT,
     ONES,
     PASSIVITY,
     PD,
@@ -147,7 +148,7 @@ def _periods(rows: list[dict]) -> str:
 @styled
 def draw_errors(shown: dict, path: Path) -> None:
     """Joint errors over time, one panel a joint: the paper's Fig. 8."""
-    names = (PD, ELM, PSO, SSADE, ONES, COMPUTED, PASSIVITY)
+    names = (PD, ELM, PSO, SSADE, ONES, COMPUTED, PASSIVITY, LEARNT)
     figure = new_figure(5.2, 6.5)
     panels = figure.subplots(3, 1, sharex=True)
     handles = []

@@ -18,6 +18,7 @@ from jffsr.dynamics.momentum import base_twist
 from jffsr.reactionless.control.computed_torque import ComputedTorque
 from jffsr.reactionless.control.errors import Gains
 from jffsr.reactionless.control.extreme_learning import HIDDEN, INPUTS, ExtremeLearning, random_machine
+from jffsr.reactionless.control.learnt_load import LearntLoad
 from jffsr.reactionless.control.passivity import PassivityBased
 from jffsr.reactionless.control.proportional_derivative import ProportionalDerivative
 from jffsr.reactionless.control.training import MachineTraining, train_machine
@@ -35,9 +36,9 @@ SAMPLES = int(DURATION / PERIOD)
 STRUCK = 10.0
 TRAINING_SAMPLES, TRAINING_LOADS, TRAINING_SEED = 400, 2, 1000
 PD, ELM, PSO, SSADE, ONES = "PD", "ELM", "PSO-ELM", "SSADE-ELM", "integrator"
-COMPUTED, PASSIVITY = "computed torque", "passivity-based"
+COMPUTED, PASSIVITY, LEARNT = "computed torque", "passivity-based", "learnt load"
 PSO_LONG, SSADE_LONG = "PSO-ELM, 30,000", "SSADE-ELM, 30,000"
-CONTROLLERS = (PD, ELM, PSO, SSADE, PSO_LONG, SSADE_LONG, ONES, COMPUTED, PASSIVITY)
+CONTROLLERS = (PD, ELM, PSO, SSADE, PSO_LONG, SSADE_LONG, ONES, COMPUTED, PASSIVITY, LEARNT)
 LONG = 30_000
 SIMULATION, STROKE, HIT, QUIET = "simulation", "stroke", "hit", "undisturbed"
 _NO_STRIKE = Strike(np.zeros(6), STRUCK)
@@ -115,6 +116,8 @@ def controller(name: str, free: np.ndarray | None = None):
         return ProportionalDerivative.of(ROBOT, POSTURE)
     if name == COMPUTED:
         return ComputedTorque.of(ROBOT)
+    if name == LEARNT:
+        return LearntLoad.of(ROBOT)
     if name == PASSIVITY:
         return PassivityBased.of(ROBOT)
     return ExtremeLearning.of(ROBOT, POSTURE, free)
