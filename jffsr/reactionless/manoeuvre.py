@@ -21,13 +21,14 @@ import numpy as np
 from jffsr.compiling import jit
 from jffsr.errors import InputError
 from jffsr.reactionless.manoeuvre_path import SampledPath
-from jffsr.reactionless.manoeuvre_space import Reach, coupling_rows, null_projector, reach_of
+from jffsr.reactionless.manoeuvre_search import sampled, search
+from jffsr.reactionless.manoeuvre_space import Reach, coupling_rows, reach_of
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
 from jffsr.rollouts.rollout import check_steps, rollout
 from jffsr.spatial.rotation import quaternion_to_rotation_vector
-from jffsr.types import Array, Scalar, Vector
+from jffsr.types import Array, Vector
 
 # The path's steps are that many times as fine as the search's, and this many iterations bring it to its end again.
 _FINER, _POLISHING = 4, 12
@@ -97,7 +98,7 @@ def zero_reaction_manoeuvre(
     start, goal = (_posture(robot, what, q) for what, q in (("start", start), ("goal", goal)))
     if not np.isfinite(duration) or duration <= 0:
         raise InputError(f"duration is {duration!r}; a positive number of seconds is expected")
-    steps = check_steps(settings.steps)
+    check_steps(settings.steps)
     about = np.random.default_rng(0).normal(scale=0.2, size=(4, robot.num_joints)) + 0.5 * (start + goal)
     postures = np.concatenate([[start, goal], about])
     rows = coupling_rows(robot, postures)
@@ -109,21 +110,24 @@ def zero_reaction_manoeuvre(
         )
         return Manoeuvre(ManoeuvreCode.NO_NULL_SPACE, text, None, apart, np.nan, Reach(0, 0))
     key = jax.random.PRNGKey(0) if key is None else key
-    pieces, nearest = 1, np.inf
+    pieces, nearest, outside = 1, np.inf, None
     while pieces <= settings.pieces:
         stops = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (goal - start)
         ways = []
         for here, there in itertools.pairwise(stops):
-            way, error = _piece(robot, jnp.asarray(rows), here, there, settings, steps, key)
+            way, error = _piece(robot, jnp.asarray(rows), here, there, settings, pieces, key)
             if way is None:
                 break
             ways.append(way)
-        else:
-            path = _joined(ways, float(duration))
-            return _judged(robot, path, goal, settings)
-        nearest = min(nearest, error) if pieces == 1 else nearest
+        if len(ways) == pieces:
+            found = _judged(robot, _joined(ways, float(duration)), goal, settings)
+            if found.success or pieces == settings.pieces:
+                return found
+            outside = found
+        nearest = error if pieces == 1 else nearest
+        # Shorter pieces take smaller loops, which the ranges may leave room for.
         pieces *= 2
-    return _none(reach_of(robot, rows, postures), robot.num_joints, nearest, settings)
+    return outside or _none(reach_of(robot, rows, postures), robot.num_joints, nearest, settings)
 
 
 def _piece(
@@ -132,28 +136,32 @@ def _piece(
     start: np.ndarray,
     goal: np.ndarray,
     settings: ManoeuvreSettings,
-    steps: int,
+    pieces: int,
     key: Array,
 ) -> tuple[tuple[Array, Array, Array] | None, float]:
-    """Samples of a path as `_sampled` gives them, None if none is found, and the nearest arrival."""
-    shape = (settings.starts, robot.num_joints, settings.degree + 1)
+    """Samples of a path as `sampled` gives them, None if none is found, and the nearest arrival."""
+    shape, steps = (settings.starts, robot.num_joints, settings.degree + 1), settings.steps
     # The first goes straight, as far as the null space lets it.
-    first = settings.scatter * jax.random.normal(key, shape).at[0].set(0.0)
+    first = settings.scatter / np.sqrt(pieces) * jax.random.normal(key, shape).at[0].set(0.0)
     first = first.at[:, :, 0].add(goal - start)
     given = robot, rows, jnp.asarray(start)
-    coefficients, errors, lengths = _search(*given, jnp.asarray(goal), first, settings.iterations, steps)
+    coefficients, errors, lengths, outside = search(
+        *given, jnp.asarray(goal), first, settings.iterations, steps
+    )
     errors = np.where(np.isfinite(errors), errors, np.inf)
     arrived = errors <= settings.tolerance
     if not np.any(arrived):
         return None, float(np.min(errors))
-    best = int(np.argmin(np.where(arrived, lengths, np.inf)))
+    # Of those that arrive one inside the ranges, and of these the shortest.
+    inside = arrived & (np.asarray(outside) <= 0)
+    best = int(np.argmin(np.where(inside if np.any(inside) else arrived, lengths, np.inf)))
     # Finer steps: between its samples a path is only as still as they are consistent with each other.
-    polished, missed, _ = _search(
+    polished, missed, _, _ = search(
         *given, jnp.asarray(goal), coefficients[best][None], _POLISHING, _FINER * steps
     )
     if not missed[0] <= settings.tolerance:
         return None, float(missed[0])
-    return _sampled(*given, polished[0], _FINER * steps), float(missed[0])
+    return sampled(*given, polished[0], _FINER * steps), float(missed[0])
 
 
 def _joined(ways: list[tuple[Array, Array, Array]], duration: float) -> SampledPath:
@@ -164,93 +172,6 @@ def _joined(ways: list[tuple[Array, Array, Array]], duration: float) -> SampledP
         for part in zip(*ways, strict=True)
     )
     return SampledPath(positions, rate * rates, rate**2 * accelerations, jnp.asarray(duration))
-
-
-def _window(s: Scalar) -> Scalar:
-    """30 s^2 (1 - s)^2: of integral one, zero with its slope at both ends."""
-    return 30 * s**2 * (1 - s) ** 2
-
-
-def _rate(robot: Robot, rows: Array, coefficients: Array, q: Vector, s: Scalar) -> Vector:
-    """dq/ds (n,) at a share s of the way."""
-    powers = (2 * s - 1) ** jnp.arange(coefficients.shape[1])
-    return null_projector(robot, rows, q) @ (coefficients @ powers) * _window(s)
-
-
-def _integrated(robot: Robot, rows: Array, start: Vector, coefficients: Array, steps: int) -> Array:
-    """Positions (steps + 1, n) by Runge-Kutta of order 4."""
-    h = 1.0 / steps
-
-    def slope(q, s):
-        return _rate(robot, rows, coefficients, q, s)
-
-    def advance(q, s):
-        # The four stages are one loop, so that the dynamics is compiled once.
-        def stage(carry, inputs):
-            last, total = carry
-            share, weight = inputs
-            k = slope(q + share * h * last, s + share * h)
-            return (k, total + weight * k), None
-
-        zero = jnp.zeros_like(q)
-        stages = jnp.array([0.0, 0.5, 0.5, 1.0]), jnp.array([1.0, 2.0, 2.0, 1.0]) / 6
-        (_, total), _ = jax.lax.scan(stage, (zero, zero), stages)
-        return q + h * total, q
-
-    last, positions = jax.lax.scan(advance, start, h * jnp.arange(steps))
-    return jnp.concatenate([positions, last[None]])
-
-
-@partial(jit, static_argnames=("iterations", "steps"))
-def _search(
-    robot: Robot, rows: Array, start: Vector, goal: Vector, first: Array, iterations: int, steps: int
-) -> tuple[Array, Array, Array]:
-    """Coefficients (k, n, d), end errors (k,) and squared lengths (k,) of the paths from k first ones."""
-
-    def one(first):
-        def miss(flat):
-            path = _integrated(robot, rows, start, flat.reshape(first.shape), steps)
-            return path[-1] - goal, (path[-1] - goal, jnp.sum(jnp.diff(path, axis=0) ** 2))
-
-        def step(carry, _):
-            # The slope is taken where the last one was tried, so that one integration does for both.
-            flat, error, slope, length, change, damping = carry
-            tried = flat + change
-            there, (missed, way) = jax.jacfwd(miss, has_aux=True)(tried)
-            better = jnp.sum(missed**2) <= jnp.sum(error**2)
-            flat, error, slope, length = (
-                jnp.where(better, new, old)
-                for new, old in ((tried, flat), (missed, error), (there, slope), (way, length))
-            )
-            damping = jnp.clip(jnp.where(better, damping / 8, damping * 4), 1e-12, 1e6)
-            square = slope @ slope.T
-            spread = damping * jnp.trace(square) / goal.size * jnp.eye(goal.size)
-            change = -slope.T @ jnp.linalg.solve(square + spread, error)
-            return (flat, error, slope, length, change, damping), None
-
-        flat = first.ravel()
-        nothing = jnp.full_like(goal, jnp.inf), jnp.zeros((goal.size, flat.size)), jnp.zeros(())
-        start_of_search = flat, *nothing, jnp.zeros_like(flat), jnp.asarray(1e-2)
-        (flat, error, _, length, _, _), _ = jax.lax.scan(step, start_of_search, None, length=iterations + 1)
-        return flat.reshape(first.shape), jnp.max(jnp.abs(error)), length
-
-    return jax.vmap(one)(first)
-
-
-@partial(jit, static_argnames="steps")
-def _sampled(
-    robot: Robot, rows: Array, start: Vector, coefficients: Array, steps: int
-) -> tuple[Array, Array, Array]:
-    """Positions, and rates and accelerations by the share of the way, (steps + 1, n) each."""
-
-    def rate(q: Vector, s: Scalar) -> Vector:
-        return _rate(robot, rows, coefficients, q, s)
-
-    def both(q: Vector, s: Scalar) -> tuple[Vector, Vector]:
-        return jax.jvp(rate, (q, s), (rate(q, s), jnp.ones_like(s)))
-
-    path = _integrated(robot, rows, start, coefficients, steps)
-    return path, *jax.vmap(both)(path, jnp.linspace(0.0, 1.0, steps + 1))
 
 
 @partial(jit, static_argnames="steps")
@@ -317,8 +238,8 @@ def _none(reach: Reach, joints: int, error: float, settings: ManoeuvreSettings) 
         code, text = (
             ManoeuvreCode.NOT_FOUND,
             (
-                f"none was found from {settings.starts} starts and in up to {settings.pieces} pieces, though one may exist: {of} span all {joints} "
-                f"dimensions; {nearest}; raise starts, degree or iterations, or go by a posture between"
+                f"none was found from {settings.starts} starts in up to {settings.pieces} pieces, but one may exist: "
+                f"{of} span all {joints} dimensions; {nearest}; raise starts, degree or iterations"
             ),
         )
     return Manoeuvre(code, text, None, error, np.nan, reach)

@@ -163,6 +163,7 @@ def test_the_base_is_turned_back(known):
     np.testing.assert_allclose(turning(desired.joint_velocity), -0.5 * 2 * half, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_sampling_is_what_is_left_with_a_known_load():
     """Held over a sample, rates are right at its start only: the base's rate at its end falls with the period."""
     reference = AdaptiveReactionless(ROBOT, KnownLoad(LOAD, MOMENTUM), 0.0, EXCITATION, axes=(2,))

@@ -32,15 +32,20 @@ def samples(count: int = COUNT):
     return truth, regressors, regressors @ truth + 0.1 * rng.normal(size=(count, VALUES))
 
 
-def run(estimator, regressors, values, fresh=None):
-    fresh = np.ones(len(regressors), dtype=bool) if fresh is None else fresh
-
+@jax.jit
+def scanned(estimator, regressors, values, fresh):
     def step(known, sample):
         known = estimator.update(known, *sample)
         return known, (known.weights, jnp.trace(known.covariance))
 
     start = estimator.init(regressors.shape[1], values.shape[1])
-    return jax.jit(lambda *given: jax.lax.scan(step, start, given))(regressors, values, fresh)
+    return jax.lax.scan(step, start, (regressors, values, fresh))
+
+
+def run(estimator, regressors, values, fresh=None):
+    """The last knowledge, and weights and trace after each sample."""
+    fresh = np.ones(len(regressors), dtype=bool) if fresh is None else fresh
+    return scanned(estimator, regressors, values, fresh)
 
 
 def ridge(regressors, values, weights, variance=1.0):

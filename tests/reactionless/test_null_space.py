@@ -131,7 +131,7 @@ def test_chosen_axes_alone_are_held(spatial):
     state = random_state()
     found = spatial(state, MOMENTUM, np.zeros(7), np.zeros(3))
     turned = Rotation.from_quat(state.base_quaternion, scalar_first=True).inv()
-    rate = turned.apply(np.asarray(found["two"].base_twist[3:]))
+    rate = turned.apply(np.array(found["two"].base_twist[3:]))
     assert np.abs(rate[[0, 2]]).max() < 1e-12
     assert abs(rate[1]) > 1e-4
     assert int(found["two"].rank) == 2
