@@ -115,7 +115,7 @@ def zero_reaction_manoeuvre(
         stops = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (goal - start)
         ways = []
         for here, there in itertools.pairwise(stops):
-            way, error = _piece(robot, jnp.asarray(rows), here, there, settings, pieces, key)
+            way, error = _piece(robot, jnp.asarray(rows), here, there, settings, key)
             if way is None:
                 break
             ways.append(way)
@@ -125,7 +125,7 @@ def zero_reaction_manoeuvre(
                 return found
             outside = found
         nearest = error if pieces == 1 else nearest
-        # Shorter pieces take smaller loops, which the ranges may leave room for.
+        # Shorter pieces take smaller loops.
         pieces *= 2
     return outside or _none(reach_of(robot, rows, postures), robot.num_joints, nearest, settings)
 
@@ -136,13 +136,12 @@ def _piece(
     start: np.ndarray,
     goal: np.ndarray,
     settings: ManoeuvreSettings,
-    pieces: int,
     key: Array,
 ) -> tuple[tuple[Array, Array, Array] | None, float]:
     """Samples of a path as `sampled` gives them, None if none is found, and the nearest arrival."""
     shape, steps = (settings.starts, robot.num_joints, settings.degree + 1), settings.steps
     # The first goes straight, as far as the null space lets it.
-    first = settings.scatter / np.sqrt(pieces) * jax.random.normal(key, shape).at[0].set(0.0)
+    first = settings.scatter * jax.random.normal(key, shape).at[0].set(0.0)
     first = first.at[:, :, 0].add(goal - start)
     given = robot, rows, jnp.asarray(start)
     coefficients, errors, lengths, outside = search(
