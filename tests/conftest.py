@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import os
 from collections.abc import Iterator
@@ -67,7 +66,6 @@ def little_memory() -> Iterator[None]:
     yield
     if _resident_memory() > KEPT_MEMORY:
         forget()
-        gc.collect()
 
 
 def _resident_memory() -> float:

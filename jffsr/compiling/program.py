@@ -9,6 +9,7 @@ from running (`seconds_waited`). And within a mesh of devices every argument goe
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
 import weakref
@@ -22,7 +23,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
-from jffsr.compiling import store
+from jffsr.compiling import room, store
 from jffsr.compiling.options import ONCE, OPTIONS
 
 _WORKERS = 2
@@ -44,12 +45,14 @@ def is_waiting() -> bool:
 def forget() -> None:
     """Let go of every compiled program, JAX's own too, and of their memory: what is called next compiles anew.
 
-    A process that has gone through many different problems holds the programs of all of them (gigabytes after some
-    hundred). Programs that a thread is compiling just now stay.
+    A process that has gone through many different problems holds the programs of all of them: gigabytes after some
+    hundred, and more mappings than the system allows (`jffsr.compiling.room`), before which this is done of itself.
+    Programs that a thread is compiling just now stay.
     """
     for known in list(_all):
         known.forget()
     jax.clear_caches()
+    gc.collect()
 
 
 class Program:
@@ -144,6 +147,9 @@ class Program:
         everywhere = _everywhere()
         dynamic = [arg for i, arg in enumerate(args) if i not in self._static]
         static = [args[i] for i in self._static]
+        # In other threads something may be traced just now, whose caches this would empty.
+        if threading.current_thread() is threading.main_thread() and room.has_little_room():
+            forget()
         name = store.name_of(self._function, self._options, static, dynamic, _mesh())
         if name is not None:
             kept = store.load(name, _mesh())

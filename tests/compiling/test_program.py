@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import threading
 import weakref
 
@@ -12,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jffsr.compiling import Program, forget
+from jffsr.compiling import Program, forget, room
 from jffsr.compiling.program import is_waiting, seconds_waited
 
 
@@ -115,8 +114,21 @@ def test_what_is_forgotten_is_compiled_anew():
     assert len(traces) == 1
     executable = weakref.ref(next(iter(program._compiled.values())).result())
     forget()
-    gc.collect()
     assert executable() is None
     results.append(program(np.float64(3.0)))
     assert len(traces) == 2
     np.testing.assert_array_equal(results, [2.0, 4.0, 6.0])
+
+
+def test_before_the_mappings_end_what_was_compiled_is_let_go_of(monkeypatch):
+    first, second = Program(lambda x: 2 * x), Program(lambda x: 3 * x)
+    first(np.float64(1.0))
+    # What NumPy and the interpreter map leaves a share above zero.
+    assert 0 < room.mappings_share() < room.MOST
+    second(np.float64(1.0))
+    assert first._compiled
+    monkeypatch.setattr(room, "MOST", 0.0)
+    assert second(np.ones(2)).tolist() == [3.0, 3.0]
+    assert not first._compiled
+    assert len(second._compiled) == 1
+    assert first(np.float64(2.0)) == 4.0
