@@ -20,7 +20,15 @@ import jax
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from experiments.captures.sampling import draw, geometry, initial_state, judge, motion_of, read_seed, robot
+from experiments.captures.sampling import (
+    draw,
+    first_feasible,
+    geometry,
+    initial_state,
+    motion_of,
+    read_seed,
+    robot,
+)
 from experiments.captures.work import read_lines, write_line
 from experiments.pages import fill
 from jffsr.capture.candidates import CandidateSettings
@@ -223,17 +231,6 @@ def draw_page(path: Path, lines: list[dict]) -> None:
     save_figure(figure, path.with_suffix(""), ("png",))
 
 
-def feasible(count: int) -> list[int]:
-    """Numbers of the first feasible samples."""
-    found, at = [], 0
-    while len(found) < count:
-        numbers = np.arange(at, at + 32)
-        verdict = judge([draw(read_seed(SEED), int(n)) for n in numbers])
-        found += [int(n) for n, good in zip(numbers, verdict.feasible, strict=True) if good]
-        at += 32
-    return found[:count]
-
-
 def main() -> None:
     """Carry out what is missing, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -247,7 +244,7 @@ def main() -> None:
     lines = read_lines(kept)
     for noise in NOISES:
         have = {line["number"] for line in lines if line["noise"] == noise}
-        for number in feasible(arguments.count):
+        for number in first_feasible(read_seed(SEED), arguments.count):
             if number in have:
                 continue
             line = judged(number, noise)

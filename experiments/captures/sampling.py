@@ -287,6 +287,18 @@ def feasible_samples(seed: int, count: int, at_once: int = 256) -> tuple[list[Sa
     return accepted, Verdict(np.array(reasons), np.array(times))
 
 
+def first_feasible(seed: int, count: int, at_once: int = 32) -> list[int]:
+    """Numbers of the first `count` feasible samples of a seed."""
+    found: list[int] = []
+    at = 0
+    while len(found) < count:
+        numbers = range(at, at + at_once)
+        verdict = judge([draw(seed, number) for number in numbers])
+        found += [number for number, good in zip(numbers, verdict.feasible, strict=True) if good]
+        at += at_once
+    return found[:count]
+
+
 if __name__ == "__main__":
     jax.config.update("jax_enable_x64", True)
     for which in ("first", "second"):

@@ -15,7 +15,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from experiments.captures.sampling import WINDOW, Sample, draw, judge, read_seed
+from experiments.captures.sampling import WINDOW, Sample, draw, first_feasible, read_seed
 from experiments.chain.page import write_page
 from jffsr.compiling.keeping import keep_programs
 from jffsr.study.chain.running import run_chain
@@ -78,18 +78,6 @@ def _text(value) -> str:
     return repr(float(value)) if isinstance(value, float | np.floating) else str(value)
 
 
-def feasible(count: int) -> list[int]:
-    """Numbers of the first feasible samples."""
-    found: list[int] = []
-    at = 0
-    while len(found) < count:
-        numbers = np.arange(at, at + 32)
-        verdict = judge([draw(read_seed(SEED), int(n)) for n in numbers])
-        found += [int(n) for n, good in zip(numbers, verdict.feasible, strict=True) if good]
-        at += 32
-    return found[:count]
-
-
 def main() -> None:
     """Run what is missing, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -102,7 +90,7 @@ def main() -> None:
     keep_programs()
     part, parts = (int(number) for number in arguments.part.split("/"))
     folder, summaries = Path(arguments.folder), {}
-    numbers = feasible(arguments.count)
+    numbers = first_feasible(read_seed(SEED), arguments.count)
     for number in numbers:
         path = folder / f"{number:04d}"
         if numbers.index(number) % parts != part:

@@ -105,6 +105,11 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
     )
 
 
+def of(dims, values, units: str, meaning: str):
+    """A variable with its dimensions, units and what it is."""
+    return dims, np.asarray(values), {"units": units, "long_name": meaning}
+
+
 def save_dataset(dataset, path: Path, encoding: dict | None = None) -> None:
     """Write a Dataset as netCDF-4 atomically; encoding is xarray's. Raises OSError where there is no room for it."""
     # HDF5 may end the process where the disk is full, so it writes to memory first.

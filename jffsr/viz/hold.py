@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from jffsr.crosscheck.compare import attitude_difference
 from jffsr.viz.style import COLOURS, GREY, legend_above, line_look, new_figure, styled
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def draw_hold(
         panels[0].set_ylim(bottom=np.rad2deg(0.3 * moving.min()))
     if allowed is not None:
         panels[0].axhline(np.rad2deg(allowed), color=GREY, linestyle=(0, (4, 2)), linewidth=0.7)
-    panels[1].plot(time, np.rad2deg(turns(dataset["base_quaternion"].values)), color=COLOURS[1])
+    panels[1].plot(time, np.rad2deg(turned_by(dataset["base_quaternion"].values)), color=COLOURS[1])
     panels[1].set_ylabel("base turned by [deg]")
     scale = np.where(slides, 1.0, 180 / np.pi)
     _curves(panels[2], time, scale * dataset["joint_velocity"].values)
@@ -69,12 +70,9 @@ def draw_hold(
     return figure
 
 
-def turns(quaternion: np.ndarray) -> np.ndarray:
+def turned_by(quaternion: np.ndarray) -> np.ndarray:
     """Angles (K,), rad, from the first of attitudes (K, 4)."""
-    first, others = quaternion[0], quaternion
-    vector = first[0] * others[:, 1:] - others[:, :1] * first[1:] - np.cross(first[1:], others[:, 1:])
-    # Through the sine of half the angle, which no rounding spoils where there is hardly a turn.
-    return 2 * np.arctan2(np.linalg.norm(vector, axis=1), np.abs(others @ first))
+    return attitude_difference(quaternion, quaternion[:1])
 
 
 def running_rms(time: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:

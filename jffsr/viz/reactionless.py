@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jffsr.robots.robot import Robot
-from jffsr.viz.hold import WINDOW, draw_hold, running_rms, turns
+from jffsr.viz.hold import WINDOW, draw_hold, running_rms, turned_by
 from jffsr.viz.save import KINDS, save_figure
 from jffsr.viz.style import legend_above, line_look, new_figure, styled
 
@@ -51,7 +51,7 @@ def draw_bases(dataset: Dataset) -> Figure:
     panels = figure.subplots(2, sharex=True)
     time = dataset["time"].values
     for number in range(len(names)):
-        turned = turns(dataset["base_quaternion"].values[number])
+        turned = turned_by(dataset["base_quaternion"].values[number])
         spin = running_rms(time, np.linalg.norm(dataset["base_twist"].values[number, :, 3:], axis=1), WINDOW)
         panels[0].plot(time, np.rad2deg(turned), **line_look(number))
         panels[1].plot(time, np.rad2deg(np.maximum(spin, _LEAST)), **line_look(number))

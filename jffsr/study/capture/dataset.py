@@ -26,6 +26,7 @@ from jffsr.spatial.rotation import (
 from jffsr.study.capture.building import CaptureStudy, build_clearance
 from jffsr.study.capture.planned import PlannedCapture
 from jffsr.study.capture.schema import CaptureConfig
+from jffsr.study.dataset import of
 from jffsr.target.target_state import TargetState
 from jffsr.types import Array
 
@@ -77,11 +78,6 @@ def _attributes(config: CaptureConfig, study: CaptureStudy, found: PlannedCaptur
         **({} if found.time is None else {"criterion_time": found.time}),
         **({} if config.planner.margin is None else {"margin": config.planner.margin}),
     }
-
-
-def of(dims, values, units: str, meaning: str):
-    """A variable with its dimensions, units and what it is."""
-    return dims, np.asarray(values), {"units": units, "long_name": meaning}
 
 
 def _criterion(found: PlannedCapture) -> tuple[dict, dict]:

@@ -22,6 +22,15 @@ def given_in_degrees(value, quantity: str, degrees: float):
     return value
 
 
+def grasp_tolerances(value):
+    """The mapping with the tolerances of a grasp that have two units written out, each in the one that is usual."""
+    value = given_in_degrees(value, "attitude", 2.0)
+    no_rate = isinstance(value, dict) and all(
+        value.get(key) is None for key in ("angular_velocity", "angular_velocity_deg")
+    )
+    return {**value, "angular_velocity": 0.01} if no_rate else value
+
+
 class Camera(Section):
     """A camera's poses of the marker: standard deviations on each axis, and what goes wrong."""
 
@@ -91,11 +100,7 @@ class Convergence(Section):
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        value = given_in_degrees(value, "attitude", 2.0)
-        no_rate = isinstance(value, dict) and all(
-            value.get(key) is None for key in ("angular_velocity", "angular_velocity_deg")
-        )
-        return {**value, "angular_velocity": 0.01} if no_rate else value
+        return grasp_tolerances(value)
 
     @model_validator(mode="after")
     def _check(self) -> Convergence:

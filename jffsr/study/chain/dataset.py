@@ -8,7 +8,8 @@ from jffsr.capture.mujoco_approach import Approach
 from jffsr.robots.robot import Robot
 from jffsr.study.capture.observing import ObservedTarget
 from jffsr.study.chain.carried_out import Chain
-from jffsr.study.reactionless.dataset import coordinates, hold_dataset, motion_variables, of
+from jffsr.study.dataset import of
+from jffsr.study.reactionless.dataset import coordinates, hold_dataset, motion_variables
 from jffsr.target.target_state import TargetState
 
 APPROACH, HOLD = 0, 1

@@ -10,7 +10,7 @@ from jffsr.dynamics.base_mode import FLOATING
 from jffsr.reading.section import Section
 from jffsr.reading.values import choice, conflict, number, whole
 from jffsr.study.capture.schema import CaptureConfig
-from jffsr.study.capture.schema_observation import given_in_degrees
+from jffsr.study.capture.schema_observation import grasp_tolerances
 from jffsr.study.reactionless.schema_hold import Hold
 
 Positive = Annotated[float, number(gt=0)]
@@ -38,11 +38,7 @@ class GraspTolerance(Section):
     @model_validator(mode="before")
     @classmethod
     def _default(cls, value):
-        value = given_in_degrees(value, "attitude", 2.0)
-        no_rate = isinstance(value, dict) and all(
-            value.get(key) is None for key in ("angular_velocity", "angular_velocity_deg")
-        )
-        return {**value, "angular_velocity": 0.01} if no_rate else value
+        return grasp_tolerances(value)
 
     @model_validator(mode="after")
     def _check(self) -> GraspTolerance:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.crosscheck.compare import attitude_difference
 from jffsr.study.reactionless.holding import Held
 
 _FAR = 1e-3
@@ -75,10 +76,7 @@ class HoldCheck:
 def compared(name: str, mujoco: Held, ours: Held) -> HoldComparison:
     """A run in both plants, sample by sample."""
     theirs, own = mujoco.run.states, ours.run.states
-    sign = np.where(np.sum(theirs.base_quaternion * own.base_quaternion, axis=1) < 0, -1.0, 1.0)
-    # The angle from the chord: the arc cosine is blind to what is small.
-    chord = np.linalg.norm(theirs.base_quaternion - sign[:, None] * own.base_quaternion, axis=1)
-    apart = 4 * np.arcsin(np.clip(chord / 2, 0.0, 1.0))
+    apart = attitude_difference(theirs.base_quaternion, own.base_quaternion)
     return HoldComparison(
         name,
         mujoco.base_rate,

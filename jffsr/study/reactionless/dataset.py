@@ -8,6 +8,7 @@ import numpy as np
 
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.study.dataset import of
 from jffsr.study.reactionless.holding import Held
 
 _SECOND = {"revolute": "rad", "prismatic": "m"}
@@ -90,11 +91,6 @@ def coordinates(robot: Robot, time: np.ndarray) -> dict:
         "component": ("component", ["w", "x", "y", "z"]),
         "twist": ("twist", ["vx", "vy", "vz", "wx", "wy", "wz"]),
     }
-
-
-def of(dims, values, units: str, meaning: str):
-    """A variable with its dimensions, units and what it is."""
-    return dims, np.asarray(values), {"units": units, "long_name": meaning}
 
 
 def _unit(robot: Robot, units: dict[str, str]) -> str:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.compiling import program
+from jffsr.crosscheck.compare import attitude_difference
 from jffsr.errors import InputError
 from jffsr.reactionless.control.computed_torque import ComputedTorque
 from jffsr.reactionless.control.errors import Gains
@@ -188,10 +189,7 @@ def _runs(whole, state, reference, controller, settings, keys):
 def _judged(hold: Hold, robot: Robot, run: LoopRun) -> Held:
     rates = np.linalg.norm(run.states.base_twist[:, 3:], axis=1)
     last = run.time >= run.time[-1] - hold.settled
-    start, end = run.states.base_quaternion[0], run.states.base_quaternion[-1]
-    # Through the sine of half the angle, which rounding leaves alone at no turn at all.
-    sine = np.linalg.norm(end[0] * start[1:] - start[0] * end[1:] + np.cross(start[1:], end[1:]))
-    turned = 2 * np.arctan2(sine, abs(start @ end))
+    turned = attitude_difference(run.states.base_quaternion[0], run.states.base_quaternion[-1])
     lower, upper = np.asarray(robot.limits.position_lower), np.asarray(robot.limits.position_upper)
     bounded = np.isfinite(lower) & np.isfinite(upper)
     used = 0.0
