@@ -28,7 +28,7 @@ from jffsr.robots.loading import list_robots, load_robot  # noqa: E402
 from jffsr.robots.robot import Robot  # noqa: E402
 
 # Bytes of memory above which a worker lets go of compiled programs before the next file.
-KEPT_MEMORY = 2.5e9
+KEPT_MEMORY = 4e9
 
 DATA = Path(__file__).parent / "data"
 

@@ -131,6 +131,7 @@ def test_the_lookup_is_linear_between_centres_zero_outside_and_differentiable():
     assert bool(np.all(np.isfinite(at(beyond)[1])))
 
 
+@pytest.mark.slow
 def test_a_tool_within_the_base_is_in_contact(robots):
     robot = robots["ye_2019_planar3"]
     both = [jffsr.capability_map(robot, cells=60, directions=4, self_clearance=on) for on in (True, False)]
@@ -164,6 +165,7 @@ def found_again(robot, clearance, count):
     return reached.mean(), all(possible)
 
 
+@pytest.mark.slow
 def test_poses_of_random_postures_are_found_again(robots):
     share, possible = found_again(robots["servicer_7dof"], None, 512)
     assert possible

@@ -15,7 +15,7 @@ from jffsr.clearance.model import ClearanceModel
 from jffsr.clearance.solids import solid_of
 from jffsr.robots.robot import Topology
 
-FEW = ("box", "capsule", "cylinder")
+FEW = ("box", "capsule")
 ALL = ("box", "capsule", "box", "cylinder", "sphere")
 
 

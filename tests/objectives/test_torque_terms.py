@@ -158,6 +158,7 @@ def test_the_overrun_of_positions_is_relative_to_half_the_range(make_motion):
     np.testing.assert_allclose(gradient.sum(axis=0), [1 / 1.5, -0.5, 0, -1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_gradients_of_all_terms_through_a_motion_are_the_differences():
     """Of the smooth index of the planar arm with every term, at random points and at the straight quintic."""
     robot = load_robot("hu_2011_planar2")

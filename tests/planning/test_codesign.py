@@ -70,6 +70,7 @@ def test_a_whole_turn_of_one_link_answers_as_its_closed_form():
     assert np.all(np.abs(expected) > 0.1)
 
 
+@pytest.mark.slow
 def test_the_gradient_is_that_of_robots_built_otherwise(problem):
     robot = problem.robot
     assert mounted_joints(robot) == (0,)

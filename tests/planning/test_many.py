@@ -48,6 +48,7 @@ def test_a_batch_is_planned_and_judged_like_single_plans(problems, plans):
     assert len(set(np.asarray(plans.cost).tolist())) == 3
 
 
+@pytest.mark.slow
 def test_plans_do_not_depend_on_the_devices(plans):
     """Three plans, two at a time, on four devices."""
     found = output_of(Path(__file__).parent / "plans_on_four_devices.py", devices=4)

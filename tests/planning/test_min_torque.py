@@ -115,6 +115,7 @@ def test_angle_and_torques_are_those_of_the_planar_equations(problem):
     np.testing.assert_allclose(motion.base_quaternion[0], ATTITUDE, rtol=0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_constrained_optimum_is_no_worse_than_the_reference_at_every_degree(problem, evaluated):
     best = np.array([0.9, -0.5] + [0.0] * 6)
     reached = {}

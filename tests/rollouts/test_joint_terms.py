@@ -81,14 +81,16 @@ def _same_trees(robots: dict[str, Robot]) -> dict[tuple, list[str]]:
     return groups
 
 
-@pytest.mark.parametrize("place", range(5))
+@pytest.mark.parametrize(
+    "place", [pytest.param(k, marks=[] if k in (0, 2) else [pytest.mark.slow]) for k in range(5)]
+)
 def test_every_robot_of_the_catalogue(robots, place):
     groups = list(_same_trees(robots).values())
     assert len(groups) == 5, "a robot with another tree wants a place of its own here"
     _compare([robots[name] for name in groups[place]])
 
 
-@pytest.mark.parametrize("kinds", ["both", "slides"])
+@pytest.mark.parametrize("kinds", [pytest.param("both", marks=pytest.mark.slow), "slides"])
 def test_a_tree_with_several_tips(robots, kinds):
     robot = robots["two_arms"]
     assert {REVOLUTE, PRISMATIC} == set(robot.topology.joint_types)

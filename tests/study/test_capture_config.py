@@ -103,7 +103,8 @@ def test_the_published_attitude_is_made_unit_and_noted():
     [
         (
             ["kind=captur"],
-            "found 'captur', 'planning', 'tracking' or 'capture' is expected; did you mean 'capture'?",
+            "found 'captur', 'planning', 'tracking', 'capture', 'reactionless' or 'chain' is expected; "
+            "did you mean 'capture'?",
         ),
         (
             ["target.inertia=[1, 2]"],

@@ -171,11 +171,15 @@ REPLACED = {
     ): "x.yaml:3: task.goal_deg: missing, 'goal_deg' (or 'goal', in rad or m) is required",
     ("robot:", "robt:"): "x.yaml:2: robt: unknown key; did you mean 'robot'? (and 1 more)",
     ("robot: wu_6dof", ""): "x.yaml:1: robot: missing, this key is required",
-    ("kind: planning", ""): "x.yaml:2: kind: missing, 'planning', 'tracking' or 'capture' is expected",
+    (
+        "kind: planning",
+        "",
+    ): "x.yaml:2: kind: missing, 'planning', 'tracking', 'capture', 'reactionless' or 'chain' is expected",
     (
         "planning",
         "planing",
-    ): "x.yaml:1: kind: found 'planing', 'planning', 'tracking' or 'capture' is expected; did you mean 'planning'?",
+    ): "x.yaml:1: kind: found 'planing', 'planning', 'tracking', 'capture', 'reactionless' or 'chain' is expected; did "
+    "you mean 'planning'?",
     (GOOD, ""): "x.yaml: the file is empty, a mapping of keys is expected",
     (GOOD, "[1]\n"): "x.yaml:1: a mapping of keys is expected, such as 'kind: planning'",
 }

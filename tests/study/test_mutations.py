@@ -68,7 +68,7 @@ def damaged(number: int, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "share", [pytest.param(k, marks=[] if k in (2, 3) else [pytest.mark.slow]) for k in range(SHARES)]
+    "share", [pytest.param(k, marks=[] if k == 2 else [pytest.mark.slow]) for k in range(SHARES)]
 )
 def test_damaged_files_end_well(share, small, compiled, tmp_path, capsys):
     ended = {cli.MET: 0, cli.BAD_INPUT: 0, cli.NOT_MET: 0}

@@ -62,7 +62,8 @@ def test_the_path_begins_where_the_tool_is_or_where_it_is_told():
     [
         (
             ["kind=trackin"],
-            "found 'trackin', 'planning', 'tracking' or 'capture' is expected; did you mean 'tracking'?",
+            "found 'trackin', 'planning', 'tracking', 'capture', 'reactionless' or 'chain' is expected; "
+            "did you mean 'tracking'?",
         ),
         (["tracker.method=adaptve"], "tracker.method: found 'adaptve', "),
         (["compare.damped.metod=x"], "compare.damped.metod: unknown key; did you mean 'method'?"),

@@ -73,6 +73,7 @@ def test_outliers_are_refused_and_change_little(followed):
     assert np.all(spread[1][11:14] > spread[0][11:14])
 
 
+@pytest.mark.slow
 def test_unseen_poses_leave_the_prediction_alone(followed):
     seen, run, _ = followed
     hidden = np.ones(COUNT, bool)

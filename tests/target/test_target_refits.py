@@ -52,6 +52,7 @@ def differences(poses: Measurements, other: Measurements) -> np.ndarray:
     return np.concatenate([np.asarray(poses.position - other.position), turned], axis=1)
 
 
+@pytest.mark.slow
 def test_the_normal_equations_are_those_of_finite_differences():
     count, until = 30, 25
     prior = TargetPrior.create((0.1, -0.05, 0.2), inertia=(0.7, 0.9, 1.0))

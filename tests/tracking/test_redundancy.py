@@ -79,6 +79,7 @@ def base_turn(tracked):
 
 
 @pytest.mark.parametrize("name", [name for name in TASKS if name != "none"])
+@pytest.mark.slow
 def test_secondary_tasks_leave_the_tool_alone(motions, name):
     assert float(jnp.min(motions[name].singular_values)) > FOLLOW.epsilon
     without, found = pose_errors(motions["none"]), pose_errors(motions[name])
@@ -89,6 +90,7 @@ def test_secondary_tasks_leave_the_tool_alone(motions, name):
     assert np.max(np.abs(moved)) > 1e-2
 
 
+@pytest.mark.slow
 def test_secondary_goals_improve(arm, motions):
     none = motions["none"]
     assert limit_distance(arm, motions["limits"]) < limit_distance(arm, none) - 1e-3
@@ -138,6 +140,7 @@ def test_priorities_rank(arm):
         assert abs(float(climbed[joint]) - slope) < 1e-7
 
 
+@pytest.mark.slow
 def test_first_order_change_of_the_tool_is_none(arm, motions):
     """At the common start, what a secondary task adds to the rates moves joints, and does not move the tool."""
     kin = kinematics(arm, wu_path.state_at(POSTURE))

@@ -85,6 +85,7 @@ def test_given_rates_make_the_tracked_motion_again(wu, path, tracked):
             np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_of_the_errors_agree_with_differences(wu, path, tracked):
     rates = tracked.motion.joint_velocity[:-1]
     # Not on a kink of the trapezoid, where the twist's derivative jumps.
