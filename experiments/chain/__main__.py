@@ -50,7 +50,7 @@ def overrides(sample: Sample, number: int) -> list[str]:
         "observation.prior.inertia": guess,
         "observation.seed": number,
         "hold.seed": number,
-        "seed": number,
+        "approach.step": 0.004,
         "grasp_time.window": list(WINDOW),
         "planner.times": 4,
         "planner.starts": 12,
