@@ -106,17 +106,18 @@ def summary_text(summary: dict[str, Any]) -> str:
     """A summary for the terminal."""
     contact = summary["contact"]
     lines = [f"{summary['name']}: {summary['result']['sentence']}", ""]
+    width = max(24, 2 + max(map(len, summary["runs"])))
     lines.append(
         f"  contact       {np.linalg.norm(contact['momentum'][3:]):.4g} N m s; base {contact['base_rate']:.3g} rad/s "
         f"right after, at {contact['mass']:.4g} kg"
     )
     lines.append(
-        f"  {'run':<24}{'base rate':>12}{'turned':>11}{'mean error':>12}{'rms':>11}{'peak':>11}  held"
+        f"  {'run':<{width}}{'base rate':>12}{'turned':>11}{'mean error':>12}{'rms':>11}{'peak':>11}  held"
     )
     for name, run in summary["runs"].items():
         turned, errors = np.rad2deg(run["turned"]), [run[f"{key}_error"] for key in ("mean", "rms", "peak")]
         numbers = f"{run['base_rate']:>8.2e} r/s{turned:>7.2g} deg" + "".join(f"{x:>11.2e}" for x in errors)
-        lines.append(f"  {name:<24}{numbers}  {run['held']} of {summary['seeds']}")
+        lines.append(f"  {name:<{width}}{numbers}  {run['held']} of {summary['seeds']}")
     return "\n".join(lines + last_lines(summary))
 
 
