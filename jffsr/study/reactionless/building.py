@@ -51,17 +51,24 @@ def build_study(config: ReactionlessConfig) -> ReactionlessStudy:
     start = start_state(config, robot)
     end_effector = chosen_end_effector(config, robot, "grasp a load")
     for name, hold in config.holds.items():
-        build_controller(hold, robot, start, f"{config.where('hold')}: run '{name}'")
+        build_controller(hold, robot, start, f"{config.where('hold')}: run '{name}'", end_effector)
+    if config.strike is not None and end_effector != robot.end_effector_names[0]:
+        raise InputError(
+            f"{config.where('strike')}: the pendulum strikes the first end effector, '{robot.end_effector_names[0]}'; "
+            f"the load is on '{end_effector}'"
+        )
     wanted = config.load
     target = _told(config, "load.inertia", lambda: Target.create(np.array(wanted.inertia), wanted.mass))
     attitude = _attitude(config)
     place, quaternion = jax.device_get(end_effector_pose(robot, kinematics(robot, start), end_effector))
     turn = np.asarray(quaternion_to_matrix(quaternion))
     full = np.asarray(quaternion_multiply(quaternion, attitude))
-    spin = np.zeros(3) if wanted.si("angular_velocity") is None else np.array(wanted.si("angular_velocity"))
     back = np.asarray(quaternion_to_matrix(full)).T
     state = TargetState.create(
-        place + turn @ np.array(wanted.position), np.array(wanted.velocity), full, back @ spin
+        place + turn @ np.array(wanted.position),
+        np.array(wanted.velocity),
+        full,
+        back @ np.array(wanted.si("angular_velocity")),
     )
     momentum = np.array(config.task.momentum)
     moving = _moving(robot, start, momentum)

@@ -154,6 +154,11 @@ def build_controller(
     if hold.controller == "computed_torque":
         return ComputedTorque.of(robot, gains)
     if hold.controller == "passivity_based":
+        if end_effector not in (None, robot.end_effector_names[0]):
+            raise InputError(
+                f"{where}.controller: 'passivity_based' adapts a load on the first end effector, "
+                f"'{robot.end_effector_names[0]}'; found '{end_effector}', take another controller"
+            )
         return PassivityBased.of(robot, gains, period=period)
     if hold.controller == "pd":
         return ProportionalDerivative.of(robot, q, gains)
