@@ -106,7 +106,8 @@ def test_what_acts_on_the_first_tool_alone_is_refused_for_another(override, sent
     second = robot.end_effector_names[1]
     file = tmp_path / "study.yaml"
     file.write_text(
-        f"kind: reactionless\nrobot: dual_arm_servicer\nload: {{mass: 5, inertia: [1, 1, 1], angular_velocity: [0, 0, 0.1]}}\n"
+        f"kind: reactionless\nrobot: dual_arm_servicer\n"
+        f"load: {{mass: 5, inertia: [1, 1, 1], angular_velocity: [0, 0, 0.1]}}\n"
         f"task: {{start: {[0.1] * robot.num_joints}, end_effector: {second}}}\n"
     )
     with pytest.raises(jffsr.InputError, match=sentence):
