@@ -1,0 +1,112 @@
+"""A motion ready to be shown: solids that move, ways, arrows and curves, with nothing of a viewer in it.
+
+All positions are in I, in m; F is the number of frames, which all arrays of a replay share.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+Colour = tuple[float, float, float]
+"""Red, green and blue in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A rigid body as triangles.
+
+    vertices (v, 3), m, and faces (f, 3), indices of them, counter-clockwise seen from outside, in the body's own frame;
+    position (F, 3) and quaternion (F, 4), w first, of that frame. nearness (F,) says how near a limit the body is: 0
+    far, 1 at the limit, more beyond it; None where it has none.
+    """
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    colour: Colour
+    position: np.ndarray
+    quaternion: np.ndarray
+    nearness: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Way:
+    """A line of points (F, 3) along which something goes; `ahead` says that the whole of it is known beforehand."""
+
+    name: str
+    points: np.ndarray
+    colour: Colour
+    ahead: bool = False
+
+
+@dataclass(frozen=True)
+class Arrow:
+    """A vector at a place: origin (F, 3), m, and vector (F, 3) as long as it is drawn, m."""
+
+    name: str
+    origin: np.ndarray
+    vector: np.ndarray
+    colour: Colour
+
+
+@dataclass(frozen=True)
+class Axes:
+    """A frame drawn by its three axes of `length`, m: position (F, 3), quaternion (F, 4), w first."""
+
+    name: str
+    position: np.ndarray
+    quaternion: np.ndarray
+    length: float
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A plot beside the replay: curves by name over time (k,), s, all with one unit; bounds are lines across it."""
+
+    title: str
+    unit: str
+    time: np.ndarray
+    curves: dict[str, np.ndarray]
+    bounds: tuple[float, ...] = ()
+    logarithmic: bool = False
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One motion to look at.
+
+    time (F,), s; marks are instants worth a line in the plots, by name; legend explains what is drawn, in one sentence
+    each.
+    """
+
+    title: str
+    time: np.ndarray
+    solids: tuple[Solid, ...]
+    ways: tuple[Way, ...] = ()
+    arrows: tuple[Arrow, ...] = ()
+    axes: tuple[Axes, ...] = ()
+    panels: tuple[Panel, ...] = ()
+    marks: tuple[tuple[str, float], ...] = ()
+    legend: tuple[str, ...] = ()
+
+    @property
+    def frames(self) -> int:
+        """How many frames there are."""
+        return len(self.time)
+
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (3,), m, of the box that holds everything at all frames."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for solid in self.solids:
+            reach = np.linalg.norm(solid.vertices, axis=1).max(initial=0.0)
+            low = np.minimum(low, solid.position.min(axis=0) - reach)
+            high = np.maximum(high, solid.position.max(axis=0) + reach)
+        for points in (way.points for way in self.ways):
+            low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+        return low, high
+
+    def named(self, title: str) -> Replay:
+        """The same under another title."""
+        return replace(self, title=title)
