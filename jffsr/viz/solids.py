@@ -50,13 +50,24 @@ def shape_faces(shape: Shape) -> np.ndarray:
 
 def capsule_between(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
     """The faces (f, 4, 3) of a capsule whose straight part goes from start (3,) to end (3,)."""
+    turn, length = _along(start, end)
+    return _capsule(radius, 0.5 * length) @ turn.T + 0.5 * (start + end)
+
+
+def cylinder_between(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
+    """The faces (f, 4, 3) of a cylinder whose caps are centred on start (3,) and end (3,)."""
+    turn, length = _along(start, end)
+    return _cylinder(radius, 0.5 * length) @ turn.T + 0.5 * (start + end)
+
+
+def _along(start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, float]:
+    """A rotation (3, 3) that takes z to the way from start (3,) to end (3,), and how long that is."""
     along = end - start
     length = np.linalg.norm(along)
     z = along / length if length > 0 else np.array([0.0, 0.0, 1.0])
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x = x / np.linalg.norm(x)
-    turn = np.stack([x, np.cross(z, x), z], axis=1)
-    return _capsule(radius, 0.5 * length) @ turn.T + 0.5 * (start + end)
+    return np.stack([x, np.cross(z, x), z], axis=1), float(length)
 
 
 def refined(faces: np.ndarray, longest: float) -> np.ndarray:

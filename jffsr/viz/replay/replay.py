@@ -6,8 +6,10 @@ All positions are in I, in m; F is the number of frames, which all arrays of a r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 Colour = tuple[float, float, float]
 """Red, green and blue in [0, 1]."""
@@ -100,9 +102,11 @@ class Replay:
         """Corners (3,), m, of the box that holds everything at all frames."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for solid in self.solids:
-            reach = np.linalg.norm(solid.vertices, axis=1).max(initial=0.0)
-            low = np.minimum(low, solid.position.min(axis=0) - reach)
-            high = np.maximum(high, solid.position.max(axis=0) + reach)
+            least, most = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+            corners = np.array(list(product(*zip(least, most, strict=True))))
+            turned = Rotation.from_quat(solid.quaternion, scalar_first=True).as_matrix() @ corners.T
+            points = np.swapaxes(turned, -1, -2) + solid.position[:, None]
+            low, high = np.minimum(low, points.min(axis=(0, 1))), np.maximum(high, points.max(axis=(0, 1)))
         for points in (way.points for way in self.ways):
             low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
         return low, high

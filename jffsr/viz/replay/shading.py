@@ -14,7 +14,7 @@ _STEPS = 8
 
 
 def warned(colour: Colour, nearness: float) -> Colour:
-    """`colour`, or what it becomes at this nearness: 0.7 begins, 0.85 is amber, 1 and more is red; not finite is red."""
+    """`colour`, or what it becomes from 0.7 on: amber at 0.85, red at 1 and where it is not finite."""
     if not np.isfinite(nearness):
         return AT
     # A few steps: what does not change is not sent again.

@@ -1,0 +1,56 @@
+"""Angular momentum of a robot's base and of its arms along a motion, as arrows."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jffsr.compiling import program
+from jffsr.dynamics.kinematics import kinematics, system_com
+from jffsr.dynamics.momentum import momentum
+from jffsr.robots.robot import Robot
+from jffsr.robots.state import State
+from jffsr.viz.replay.replay import Arrow, Colour
+
+BASE_COLOUR: Colour = (0.16, 0.45, 0.85)
+ARMS_COLOUR: Colour = (0.92, 0.45, 0.10)
+_LEAST = 1e-9  # N m s, below which there is nothing to draw
+
+
+@program(once=True)
+def angular_momenta(robot: Robot, states: State):
+    """Angular momenta (F, 3), N m s, of the base alone and of everything, about the system's centre of mass, in I."""
+
+    def at(state: State):
+        kin = kinematics(robot, state)
+        whole = momentum(robot, kin, state.base_twist, state.joint_velocity)
+        away = kin.base_position - system_com(robot, kin)
+        past = state.base_twist[:3] - whole[:3] / jnp.sum(jnp.asarray(robot.mass))
+        spin = kin.inertia_I[0] @ state.base_twist[3:]
+        return spin + robot.mass[0] * jnp.cross(away, past), whole[3:]
+
+    return jax.vmap(at)(states)
+
+
+def momentum_arrows(
+    robot: Robot, states: State, origin: np.ndarray, longest: float
+) -> tuple[tuple[Arrow, ...], str]:
+    """Arrows of the base's and the arms' angular momentum from origin (F, 3), and what a legend says of them.
+
+    The longest of all is `longest`, m. Nothing where the robot hardly has any.
+    """
+    base, whole = jax.device_get(angular_momenta(robot, states))
+    parts = {"base": (base, BASE_COLOUR), "arm": (whole - base, ARMS_COLOUR)}
+    largest = max(float(np.linalg.norm(vector, axis=1).max()) for vector, _ in parts.values())
+    if not np.isfinite(largest) or largest < _LEAST:
+        return (), ""
+    scale = longest / largest
+    arrows = tuple(
+        Arrow(f"momentum of the {name}", origin, scale * vector, colour)
+        for name, (vector, colour) in parts.items()
+    )
+    return arrows, (
+        "Arrows: angular momentum about the centre of mass, blue of the base, orange of the arm; "
+        f"the longest is {largest:.3g} N m s."
+    )
