@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jffsr.cli_arguments import parser
 from jffsr.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,37 +22,16 @@ if TYPE_CHECKING:
 MET, DEFECT, BAD_INPUT, NOT_MET, INTERRUPTED = 0, 1, 2, 3, 130
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None))
 
-_DESCRIPTION = """\
-Plan the motion of free-floating space robots: satellites whose arms move while the thrusters are off.
-
-A study is one YAML file. 'jffsr run' searches for a motion, re-runs what it found at a finer step by
-independent code, and leaves everything in a run folder; 'jffsr check' then drives the same robot along the
-plan in MuJoCo and in MJX."""
-
-_EPILOG = """\
-examples:
-  jffsr run configs/planning/composite_wu6.yaml
-  jffsr run composite_wu6 optimizer.particles=64 task.duration=25 --out runs/faster
-  jffsr sweep composite_wu6 task.duration=20,25,30 seeds=20 --out runs/durations
-  jffsr run wu_2018
-  jffsr run tumbling_box
-  jffsr check runs/composite_wu6
-  jffsr robots wu_6dof
-  jffsr map servicer_7dof
-
-exit status: 0 done and accuracy met; 3 done, accuracy not met; 2 bad input; 130 interrupted, checkpoint
-written (the same command with the same --out goes on from there); 1 a defect."""
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
-    arguments = _parser().parse_args(argv)
+    arguments = parser().parse_args(argv)
     # Importing and drawing make millions of objects that stay: looking through them again and again for rubbish
     # took a sixth of a short run.
     often = gc.get_threshold()
     gc.set_threshold(100_000, *often[1:])
     try:
-        return arguments.command(arguments)
+        return _COMMANDS[arguments.command](arguments)
     except InputError as error:
         print(f"jffsr: {error}", file=sys.stderr)
         return BAD_INPUT
@@ -77,132 +57,6 @@ def _defect() -> int:
     traceback.print_exc()
     print("jffsr: this is a defect in jffsr, please report it with the lines above", file=sys.stderr)
     return DEFECT
-
-
-def _parser() -> argparse.ArgumentParser:
-    from jffsr import __version__
-
-    parser = argparse.ArgumentParser(
-        prog="jffsr",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"jffsr {__version__}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-
-    run = commands.add_parser("run", help="run one study", description="Run one study, whatever its kind.")
-    run.add_argument("config", metavar="CONFIG", help="a YAML file, or a name under configs/")
-    run.add_argument(
-        "overrides", metavar="KEY=VALUE", nargs="*", help="replaces a value, for example task.duration=25"
-    )
-    run.add_argument(
-        "--out",
-        metavar="DIR",
-        help="the run folder; an existing one of the same configuration is gone on with "
-        "(default: the first free of runs/NAME, runs/NAME-2, ...)",
-    )
-    together = run.add_argument_group(
-        "several processes",
-        "Start the same command once for each process, on one machine or many; a search is spread over all of them.",
-    )
-    together.add_argument("--coordinator", metavar="HOST:PORT", help="where the first process listens")
-    together.add_argument("--processes", metavar="N", type=int, help="how many there are")
-    together.add_argument("--process", metavar="I", type=int, help="which one this is, from 0")
-    run.set_defaults(command=_run)
-
-    _add_sweep(commands)
-
-    check = commands.add_parser(
-        "check",
-        help="re-verify a finished run with MuJoCo and MJX",
-        description="Drive the robot's joints along the plan by torques alone in MuJoCo and in MJX, and report "
-        "the differences in base pose and momentum.",
-    )
-    check.add_argument("run", metavar="RUN_DIR", help="a finished run folder")
-    check.set_defaults(command=_check)
-
-    show = commands.add_parser(
-        "show",
-        help="print a finished run or sweep and draw its figures",
-        description="Print a finished run or sweep and draw it, as .png and, for a paper, as .pdf.",
-    )
-    show.add_argument("run", metavar="RUN_DIR", help="the folder of a finished run or sweep")
-    show.set_defaults(command=_show)
-
-    _add_map(commands)
-
-    robots = commands.add_parser(
-        "robots",
-        help="the catalogue of robots, with sources",
-        description="List the catalogue; or print one robot in full and draw it.",
-    )
-    robots.add_argument("robot", metavar="NAME", nargs="?", help="a catalogue name or a robot file")
-    robots.add_argument(
-        "--out", metavar="FILE.png", help="where to draw the robot (default: NAME.png in the current folder)"
-    )
-    robots.add_argument(
-        "--posture",
-        metavar="Q1,Q2,...",
-        help="the joint positions to draw it in, degrees (prismatic: m); write --posture=-30,45 "
-        "where the first is negative (default: zero, or unfolded)",
-    )
-    robots.set_defaults(command=_robots)
-    return parser
-
-
-def _add_sweep(commands: argparse._SubParsersAction) -> None:
-    sweep = commands.add_parser(
-        "sweep",
-        help="run many studies that differ in a few keys",
-        description="Run every combination of the given values, together where they share their shapes; what was "
-        "finished before a kill is kept, and the same command with the same --out goes on.",
-    )
-    sweep.add_argument(
-        "config", metavar="CONFIG", help="a sweep's YAML file, or a planning configuration to sweep over"
-    )
-    sweep.add_argument(
-        "overrides",
-        metavar="KEY=V1,V2",
-        nargs="*",
-        help="the values of a key, for example task.duration=20,30; seeds=20 is twenty seeds",
-    )
-    sweep.add_argument(
-        "--out", metavar="DIR", help="the sweep's folder (default: the first free of runs/NAME, ...)"
-    )
-    sweep.add_argument(
-        "--together", metavar="N", type=int, help="points in one compiled call, at most (default: 64)"
-    )
-    sweep.add_argument(
-        "--workers",
-        metavar="N",
-        type=int,
-        help="processes for what shares no shapes (default: cores, at most 4)",
-    )
-    sweep.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="of a dask cluster that does the work, for example tcp://10.0.0.1:8786",
-    )
-    sweep.set_defaults(command=_sweep, coordinator=None, processes=None, process=None)
-
-
-def _add_map(commands: argparse._SubParsersAction) -> None:
-    capability = commands.add_parser(
-        "map",
-        help="search which poses an arm reaches, cell by cell",
-        description="Search a robot's capability map: the share of poses that its tool reaches in each cell of the "
-        "workspace, within joint limits and clear of its own bodies. Interrupted, the same command goes on.",
-    )
-    capability.add_argument("robot", metavar="ROBOT", help="a catalogue name or a robot file")
-    capability.add_argument(
-        "settings",
-        metavar="KEY=VALUE",
-        nargs="*",
-        help="cells=20000, directions=50, rolls=8, end_effector, self_clearance=true, margin=0.0 (m), seed=0",
-    )
-    capability.add_argument("--out", metavar="FILE.nc", help="the map's file (default: ROBOT_map.nc)")
-    capability.set_defaults(command=_map, coordinator=None, processes=None, process=None)
 
 
 def _map(arguments: argparse.Namespace) -> int:
@@ -317,23 +171,51 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _show(arguments: argparse.Namespace) -> int:
     _prepare_jax()
+    from jffsr.viz import showing
+
+    for option in ("html", "report", "video"):
+        # `jffsr show --html RUN_DIR` means the run, not a file of that name.
+        if (name := getattr(arguments, option)) and Path(name).is_dir():
+            arguments.runs.append(name)
+            setattr(arguments, option, "")
+    folders = [Path(run) for run in arguments.runs]
+    if not folders:
+        raise InputError("jffsr show: the folder of a finished run or sweep is missing")
+    figures = {folder: _print_one(folder) for folder in folders}
+    written = False
+    for option, write in (("html", showing.write_page), ("video", showing.write_video)):
+        if (name := getattr(arguments, option)) is not None:
+            default = folders[0] / f"replay.{'mp4' if option == 'video' else option}"
+            print(f"  {option:<12}  {write(folders, Path(name) if name else default)}")
+            written = True
+    if (name := arguments.report) is not None:
+        if name and len(folders) > 1:
+            raise InputError(f"--report {name}: each of several runs has a report of its own, in its folder")
+        for folder in folders:
+            file = Path(name) if name else folder / "report.html"
+            print(f"  report        {showing.write_report(folder, figures[folder], file)}")
+        written = True
+    terminal = sys.stdin.isatty() and sys.stdout.isatty() and not written and showing.can_serve()
+    if arguments.serve or (terminal and not arguments.no_serve):
+        showing.serve_replays(folders, arguments.port, not arguments.no_browser)
+    return MET
+
+
+def _print_one(folder: Path) -> list[Path]:
+    """Print a finished run or sweep, draw its figures, and return their files."""
     from jffsr.study.kinds import summary_text
     from jffsr.study.run_folder import RunFolder
+    from jffsr.viz import showing
 
-    summary = RunFolder(Path(arguments.run)).read_summary()
-    if summary.get("kind") == "sweep":
-        from jffsr.viz.sweep import draw_sweep
-
-        files = draw_sweep(arguments.run)
-        print((Path(arguments.run) / "table.md").read_text(encoding="utf-8"))
+    summary = RunFolder(folder).read_summary()
+    files = showing.draw(folder)
+    if showing.is_sweep(folder):
+        print((folder / "table.md").read_text(encoding="utf-8"))
         print(f"{summary['name']}: {summary['result']['sentence']}")
     else:
-        from jffsr.viz.run import draw_run
-
-        files = draw_run(arguments.run)
         print(summary_text(summary))
     print("  figures       " + "\n                ".join(str(file) for file in files))
-    return MET
+    return files
 
 
 def _robots(arguments: argparse.Namespace) -> int:
@@ -363,6 +245,15 @@ def _prepare_jax(precision: str = "float64") -> None:
     jax.config.update("jax_enable_x64", precision == "float64")
     keep_programs()
 
+
+_COMMANDS = {
+    "run": _run,
+    "check": _check,
+    "robots": _robots,
+    "show": _show,
+    "sweep": _sweep,
+    "map": _map,
+}
 
 if __name__ == "__main__":
     sys.exit(main())

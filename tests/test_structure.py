@@ -39,6 +39,7 @@ ORDER = [
     "reactionless",
     "study",
     "viz",
+    "cli_arguments",
     "cli",
     "__main__",
 ]

@@ -19,7 +19,7 @@ def held_replays(path: Path) -> list[Replay]:
         one = while_finite(dataset.sel(run=name))
         if one.sizes["time"] >= 2:
             extras = Extras(panels=(base_rate(one), torques(one)))
-            found.append(robot_replay(str(name), robot, one, extras))
+            found.append(robot_replay(str(name), robot, one, extras, dataset.sizes["run"]))
     if not found:
         raise InputError(f"{folder.path}: nothing moved in '{run_name(folder)}'")
     return found

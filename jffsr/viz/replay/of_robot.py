@@ -16,7 +16,7 @@ from jffsr.viz.hold import turned_by
 from jffsr.viz.replay.bodies import Part, robot_parts
 from jffsr.viz.replay.momenta import momentum_arrows
 from jffsr.viz.replay.replay import Axes, Colour, Panel, Replay, Solid, Way
-from jffsr.viz.replay.thinning import chosen_samples
+from jffsr.viz.replay.thinning import chosen_samples, frames_each
 from jffsr.viz.scene import Scene, scene_of
 
 if TYPE_CHECKING:
@@ -45,11 +45,16 @@ class Extras:
     legend: tuple[str, ...] = ()
 
 
-def robot_replay(title: str, robot: Robot, dataset: Dataset, extras: Extras | None = None) -> Replay:
-    """The replay of a motion, from a dataset with the names of a run's result.nc over `time`."""
+def robot_replay(
+    title: str, robot: Robot, dataset: Dataset, extras: Extras | None = None, together: int = 1
+) -> Replay:
+    """The replay of a motion, from a dataset with the names of a run's result.nc over `time`.
+
+    together: how many such replays are shown at once.
+    """
     extras = extras or Extras()
     time = dataset["time"].values
-    chosen = chosen_samples(time)
+    chosen = chosen_samples(time, frames_each(together))
     thin = dataset.isel(time=chosen)
     scene = scene_of(robot, thin)
     reach = float(

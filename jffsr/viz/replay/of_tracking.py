@@ -52,7 +52,7 @@ def tracked_replays(path: Path) -> list[Replay]:
             legend=("Green: the way that was asked of the tool.",),
         )
         name = str(label) or run_name(folder)
-        found.append(robot_replay(name, task.robot, one, extras))
+        found.append(robot_replay(name, task.robot, one, extras, dataset.sizes["tracker"]))
     if not found:
         raise InputError(f"{folder.path}: no tracker of this run moved")
     return found

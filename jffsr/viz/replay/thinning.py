@@ -6,6 +6,12 @@ import numpy as np
 
 FRAMES = 240
 """How many frames a replay has at most: a viewer moves smoothly, and a page stays small."""
+_TOGETHER, _FEWEST = 1500, 90
+
+
+def frames_each(count: int) -> int:
+    """How many frames each of `count` replays has that are shown together: a page of all of them stays small, too."""
+    return min(FRAMES, max(_FEWEST, _TOGETHER // count))
 
 
 def chosen_samples(time: np.ndarray, most: int = FRAMES) -> np.ndarray:

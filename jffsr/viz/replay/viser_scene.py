@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from jffsr.viz.replay.layout import places, view_of
-from jffsr.viz.replay.replay import Colour, Replay, Solid, Way
+from jffsr.viz.replay.replay import Axes, Colour, Replay, Solid, Way
 from jffsr.viz.replay.shading import warned
 
 _PIECES = 60
 """Into how many pieces a way is cut, which appear one after the other."""
 _PALE: Colour = (0.62, 0.66, 0.72)
-_SMALLEST = 1e-6
-"""m, and difference of a quaternion's component: what moves less is not sent."""
+_GRID = 2.0**-14
+"""Places, as shares of the replay's size, and quaternions are rounded to this: nobody sees it, what moves less is not
+sent, and numbers that end in zeros make a page of a fraction of the size."""
 
 
 class ReplayScene:
@@ -75,6 +76,7 @@ class _Parts:
 
     def __init__(self, scene: Any, root: str, replay: Replay, size: float):
         self.replay = replay
+        self._grid = _GRID * 2.0 ** np.round(np.log2(size))
         self.roots = {
             kind: scene.add_frame(f"{root}/{kind}", show_axes=False) for kind in ("ways", "arrows", "axes")
         }
@@ -121,7 +123,7 @@ class _Parts:
     def move(self, frame: int) -> None:
         replay = self.replay
         for number, (handle, solid) in enumerate(zip(self._solids, replay.solids, strict=True)):
-            _place(handle, solid, frame)
+            self._place(handle, solid, frame)
             if solid.nearness is not None:
                 colour = warned(solid.colour, float(solid.nearness[frame]))
                 if colour != self._colours[number]:
@@ -132,9 +134,17 @@ class _Parts:
             for _, piece in pieces[min(before, now) : max(before, now)]:
                 piece.visible = now > before
         for handle, arrow in zip(self._arrows, replay.arrows, strict=True):
-            handle.points = _ends(arrow, frame)
+            handle.points = self._grid * np.round(_ends(arrow, frame) / self._grid)
         for handle, axes in zip(self._axes, replay.axes, strict=True):
-            _place(handle, axes, frame)
+            self._place(handle, axes, frame)
+
+    def _place(self, handle: Any, thing: Solid | Axes, frame: int) -> None:
+        position = self._grid * np.round(thing.position[frame] / self._grid)
+        quaternion = _GRID * np.round(thing.quaternion[frame] / _GRID)
+        if np.any(handle.position != position):
+            handle.position = position
+        if np.any(handle.wxyz != quaternion):
+            handle.wxyz = quaternion
 
     def _add_way(self, scene: Any, name: str, way: Way, thickness: float) -> list[tuple[int, Any]]:
         """The pieces of a way, each with the frame at which it is complete; a pale line where it is known ahead."""
@@ -160,14 +170,6 @@ class _Parts:
                 )
                 found.append((int(last), piece))
         return found
-
-
-def _place(handle: Any, solid: Solid, frame: int) -> None:
-    position, quaternion = solid.position[frame], solid.quaternion[frame]
-    if np.abs(handle.position - position).max() > _SMALLEST:
-        handle.position = position
-    if np.abs(handle.wxyz - quaternion).max() > _SMALLEST:
-        handle.wxyz = quaternion
 
 
 def _ends(arrow, frame: int) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -14,8 +15,8 @@ from jffsr.viz.replay.replay import Panel
 from jffsr.viz.replay.thinning import chosen_samples
 from jffsr.viz.style import GREY, line_look, new_figure, styled
 
-POINTS = 400
-"""Of a curve in a page, at most."""
+_POINTS, _FEWEST, _TOGETHER = 400, 150, 10_000
+"""Points of a curve in a page: at most, at least where there are so many, and of a curve of each plot together."""
 _SIZE = (4.4, 1.45)  # in
 
 
@@ -35,10 +36,18 @@ class Plot:
     values: np.ndarray
 
 
+def points_each(plots: int) -> int:
+    """How many points the curves of each of so many plots have in one page."""
+    return min(_POINTS, max(_FEWEST, _TOGETHER // max(plots, 1)))
+
+
 @styled
-def draw_panel(panel: Panel, marks=(), salt: str = "") -> Plot:
-    """The panel as an svg without a legend; salt keeps apart what several drawings in one page call by name."""
-    chosen = chosen_samples(panel.time, POINTS)
+def draw_panel(panel: Panel, marks: Sequence[tuple[str, float]], salt: str, points: int) -> Plot:
+    """The panel as an svg without a legend, its curves of at most so many points.
+
+    salt keeps apart what several drawings in one page call by name.
+    """
+    chosen = chosen_samples(panel.time, points)
     time = panel.time[chosen]
     values = np.array([curve[chosen] for curve in panel.curves.values()])
     figure = new_figure(_SIZE[1], _SIZE[0])
@@ -68,6 +77,8 @@ def draw_panel(panel: Panel, marks=(), salt: str = "") -> Plot:
     )
     # Without its name for the metadata's vocabulary a page asks nobody for anything, and says nothing it need not.
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    # A hundredth of a point is enough to draw with.
+    svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]).replace("\n", " "), svg)
     label = escape(f"{panel.title} over time", quote=True)
     svg = svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1)
     return Plot(svg, float(box.x0), float(box.x1), first, last, time, values)

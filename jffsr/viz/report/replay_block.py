@@ -10,7 +10,7 @@ import numpy as np
 
 from jffsr.viz.replay.recording import all_times, record_html
 from jffsr.viz.replay.replay import Panel, Replay
-from jffsr.viz.report.plots import Plot, draw_panel
+from jffsr.viz.report.plots import Plot, draw_panel, points_each
 from jffsr.viz.style import line_look
 
 _DIGITS = 4
@@ -23,9 +23,11 @@ def replay_block(replays: Sequence[Replay], title: str) -> str:
     """
     page = escape(record_html(replays, title), quote=True)
     groups, data = [], []
+    points = points_each(sum(len(replay.panels) for replay in replays))
     for number, replay in enumerate(replays):
         plots = [
-            draw_panel(panel, replay.marks, f"{number}-{place}") for place, panel in enumerate(replay.panels)
+            draw_panel(panel, replay.marks, f"{number}-{place}", points)
+            for place, panel in enumerate(replay.panels)
         ]
         figures = "\n".join(_figure(p, panel) for p, panel in zip(plots, replay.panels, strict=True))
         hidden = "" if number == 0 else " hidden"

@@ -1,0 +1,37 @@
+"""Figures inside a page: as few bytes as they can be read with."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from PIL import Image
+
+_COLOURS = 48
+_WIDEST = 900  # pixels
+
+
+def figures_block(files: Sequence[Path]) -> str:
+    """The pictures (.png) among `files`, each under its name; nothing where there are none."""
+    shown = [_figure(file) for file in files if file.suffix == ".png"]
+    return f'<div class="figures">{"".join(shown)}</div>' if shown else ""
+
+
+def _figure(file: Path) -> str:
+    with Image.open(file) as picture:
+        picture = picture.convert("RGB")
+        if picture.width > _WIDEST:
+            height = round(picture.height * _WIDEST / picture.width)
+            picture = picture.resize((_WIDEST, height), Image.Resampling.LANCZOS)
+        width, height = picture.size
+        buffer = io.BytesIO()
+        picture.quantize(_COLOURS, dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
+    name = escape(file.stem.replace("_", " "))
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return (
+        f'<figure><img alt="{name}" width="{width}" height="{height}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{name}</figcaption></figure>"
+    )

@@ -1,0 +1,109 @@
+"""What `jffsr show` makes of finished runs and sweeps: figures, a replay, a page, a video, a report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from jffsr.errors import InputError
+from jffsr.study.run_folder import RunFolder
+from jffsr.viz.replay.replay import Replay
+from jffsr.writing import write_atomically
+
+SWEEP = "sweep"
+_MOST = 16
+"""Replays that are shown side by side."""
+
+
+def is_sweep(path: str | Path) -> bool:
+    """Whether the folder is that of a finished sweep; InputError where it is not finished, or neither."""
+    return RunFolder(Path(path)).read_summary().get("kind") == SWEEP
+
+
+def draw(path: str | Path) -> list[Path]:
+    """The figures of a finished run or sweep, drawn into its folder."""
+    if is_sweep(path):
+        from jffsr.viz.sweep import draw_sweep
+
+        return draw_sweep(path)
+    from jffsr.viz.run import draw_run
+
+    return draw_run(path)
+
+
+def replays_of_all(paths: Sequence[str | Path]) -> list[Replay]:
+    """The replays of all runs, by their folders' names where there are several; InputError where nothing moved."""
+    found = []
+    for path in paths:
+        replays = _replays(path)
+        if len(paths) > 1:
+            name = Path(path).resolve().name
+            replays = [
+                replay.named(name if len(replays) == 1 else f"{name}: {replay.title}") for replay in replays
+            ]
+        found += replays
+    if len(found) > _MOST:
+        raise InputError(f"these runs hold {len(found)} motions; at most {_MOST} are shown side by side")
+    return found
+
+
+def write_page(paths: Sequence[str | Path], file: Path) -> Path:
+    """The replays of runs, side by side, as one HTML file."""
+    from jffsr.viz.report.page import replay_page
+
+    return _write(file, replay_page(replays_of_all(paths), _title(paths)))
+
+
+def write_report(path: str | Path, figures: Sequence[Path], file: Path) -> Path:
+    """The report of a run or sweep as one HTML file."""
+    if is_sweep(path):
+        from jffsr.viz.report.sweep import sweep_report
+
+        return _write(file, sweep_report(path, figures))
+    from jffsr.viz.report.report import run_report
+
+    return _write(file, run_report(path, figures))
+
+
+def write_video(paths: Sequence[str | Path], file: Path) -> Path:
+    """The replays of runs, side by side, as an mp4."""
+    from jffsr.viz.replay.video import save_video
+
+    return save_video(replays_of_all(paths), file)
+
+
+def serve_replays(paths: Sequence[str | Path], port: int | None, open_browser: bool) -> None:
+    """Show the replays of runs, side by side, in a browser until Ctrl-C."""
+    from jffsr.viz.replay.serving import serve
+
+    serve(replays_of_all(paths), _title(paths), port, open_browser)
+
+
+def can_serve() -> bool:
+    """Whether what a replay in a browser needs is installed."""
+    from importlib.util import find_spec
+
+    return find_spec("viser") is not None
+
+
+def _replays(path: str | Path) -> list[Replay]:
+    if is_sweep(path):
+        from jffsr.viz.replay.of_sweep import sweep_replays
+
+        return sweep_replays(Path(path))
+    from jffsr.viz.replay.reading import replays_of
+
+    return replays_of(path)
+
+
+def _title(paths: Sequence[str | Path]) -> str:
+    return " | ".join(Path(path).resolve().name for path in paths)
+
+
+def _write(file: Path, text: str) -> Path:
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(file, lambda part: part.write_text(text, encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written ({error.strerror or error})") from None
+    return file
