@@ -107,7 +107,8 @@ class Replay:
             turned = Rotation.from_quat(solid.quaternion, scalar_first=True).as_matrix() @ corners.T
             points = np.swapaxes(turned, -1, -2) + solid.position[:, None]
             low, high = np.minimum(low, points.min(axis=(0, 1))), np.maximum(high, points.max(axis=(0, 1)))
-        for points in (way.points for way in self.ways):
+        lines = [way.points for way in self.ways] + [arrow.origin + arrow.vector for arrow in self.arrows]
+        for points in lines:
             low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
         return low, high
 

@@ -34,7 +34,7 @@ class ReplayScene:
         scene = server.scene
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
-        scene.add_light_ambient("/light", intensity=0.7)
+        scene.add_light_ambient("/light", intensity=1.0)
         sizes = [float(np.max(np.subtract(*replay.extent()[::-1]))) for replay in self.replays]
         for number, (replay, place) in enumerate(zip(self.replays, places(self.replays), strict=True)):
             root = f"/{number}"
@@ -80,14 +80,17 @@ class _Parts:
         self.roots = {
             kind: scene.add_frame(f"{root}/{kind}", show_axes=False) for kind in ("ways", "arrows", "axes")
         }
+        # What moves is a frame around each solid: a mesh that takes another colour may miss a move that comes with it.
         self._solids = [
+            scene.add_frame(f"{root}/{number} {solid.name}", show_axes=False)
+            for number, solid in enumerate(replay.solids)
+        ]
+        self._meshes = [
             scene.add_mesh_simple(
-                f"{root}/{number} {solid.name}",
+                f"{root}/{number} {solid.name}/shape",
                 np.asarray(solid.vertices, np.float32),
                 np.asarray(solid.faces, np.uint32),
                 color=_bytes(solid.colour),
-                position=solid.position[0],
-                wxyz=solid.quaternion[0],
             )
             for number, solid in enumerate(replay.solids)
         ]
@@ -127,7 +130,7 @@ class _Parts:
             if solid.nearness is not None:
                 colour = warned(solid.colour, float(solid.nearness[frame]))
                 if colour != self._colours[number]:
-                    handle.color, self._colours[number] = _bytes(colour), colour
+                    self._meshes[number].color, self._colours[number] = _bytes(colour), colour
         for number, pieces in enumerate(self._ways):
             now = sum(last <= frame for last, _ in pieces)
             before, self._seen[number] = self._seen[number], now
