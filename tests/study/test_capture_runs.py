@@ -77,8 +77,11 @@ def test_a_handle_that_looks_away_is_no_success(away, capsys):
     assert not dataset["grasp_feasible"].any()
     assert "joint_position" not in dataset
     # Shown, its criterion is drawn; in MuJoCo there is nothing to be made again.
-    assert cli.main(["show", str(away)]) == cli.MET
+    assert cli.main(["show", str(away), "--report"]) == cli.MET
     assert "never facing" in capsys.readouterr().out
+    assert "nothing moves in it" in (away / "report.html").read_text(encoding="utf-8")
+    assert cli.main(["show", str(away), "--html"]) == cli.BAD_INPUT
+    assert "nothing moves in it" in capsys.readouterr().err
     assert {path.name for path in (away / "figures").iterdir()} == {"grasp_time.png", "grasp_time.pdf"}
     assert cli.main(["check", str(away)]) == cli.BAD_INPUT
     assert "the run found no plan" in capsys.readouterr().err

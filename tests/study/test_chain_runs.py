@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import jffsr
 from jffsr import cli
@@ -16,6 +17,7 @@ from jffsr.study.chain.grasping import missed_by
 from jffsr.study.chain.outcome import ChainCode, ChainResult
 from jffsr.study.config import dump_config, load_config
 from jffsr.study.dataset import open_dataset
+from jffsr.viz.replay.reading import replays_of
 
 CONFIG = """\
 kind: chain
@@ -148,7 +150,16 @@ def test_every_stage_leaves_its_file_and_the_momentum_goes_through(config, tmp_p
     np.testing.assert_allclose(
         momentum, np.broadcast_to(summary["contact"]["momentum"], momentum.shape), atol=1e-6
     )
-    assert cli.main(["show", str(folder)]) == cli.MET
+    assert cli.main(["show", str(folder), "--html", "--report"]) == cli.MET
+    (replay,) = replays_of(folder)
+    # From the grasp on the tool carries the target, as it was when they met.
+    (tool,) = [axes for axes in replay.axes if axes.name.startswith("axes of")]
+    (box,) = [solid for solid in replay.solids if solid.name == "target"]
+    turn = Rotation.from_quat(tool.quaternion, scalar_first=True)
+    held = replay.time >= replay.marks[0][1] - 1e-9
+    inside = turn.inv().apply(box.position - tool.position)[held]
+    np.testing.assert_allclose(inside, np.broadcast_to(inside[0], inside.shape), atol=1e-9)
+    assert np.linalg.norm(np.diff(box.position, axis=0), axis=1).max() < 0.1
     assert {"chain.png", "observation.png", "capture.png"} <= {f.name for f in (folder / "figures").iterdir()}
     assert cli.main(["run", str(config), "--out", str(folder)]) == cli.MET
 

@@ -93,6 +93,14 @@ def test_figures_are_drawn(finished):
         assert (folder / "figures" / f"{name}.png").stat().st_size > 10_000
 
 
+def test_the_page_has_every_run(finished):
+    folder, _ = finished
+    assert cli.main(["show", "--html", str(folder), "--no-serve"]) == cli.MET
+    page = (folder / "replay.html").read_text(encoding="utf-8")
+    assert ">known</option>" in page
+    assert ">fast</option>" in page
+
+
 def test_shipped_configuration_reads_back_as_it_is(tmp_path):
     config = load_config("ye_2019")
     copy = tmp_path / "copy.yaml"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import html
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -64,6 +66,28 @@ def test_folder_holds_what_is_promised(finished):
     lines = [json.loads(line) for line in (finished / "metrics.jsonl").read_text().splitlines()]
     assert lines[0]["phase"] == "swarm"
     assert lines[-1]["best_value"] == summary["cost"]
+
+
+def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
+    before = sorted(path.name for path in finished.iterdir())
+    pages = [tmp_path / "replay.html", tmp_path / "report.html"]
+    told = ["--html", str(pages[0]), "--report", str(pages[1])]
+    assert cli.main(["show", str(finished), str(finished), *told[:2]]) == cli.MET
+    assert cli.main(["show", str(finished), *told[2:]]) == cli.MET
+    capsys.readouterr()
+    # Two runs have a report each, so that one name for both is refused.
+    assert cli.main(["show", str(finished), str(finished), *told[2:]]) == cli.BAD_INPUT
+    assert "each of several runs has a report of its own" in capsys.readouterr().err
+    replay, report = (page.read_text(encoding="utf-8") for page in pages)
+    summary = json.loads((finished / "summary.json").read_text())
+    assert html.escape(summary["result"]["sentence"]) in report
+    for term in summary["terms"]:
+        assert term.replace("_", " ") in report
+    assert report.count("data:image/png;base64,") == len(list((finished / "figures").glob("*.png")))
+    assert replay.count('class="plots"') == 2
+    assert max(map(len, (replay, report))) < 3e6
+    shutil.rmtree(finished / "figures")
+    assert sorted(path.name for path in finished.iterdir()) == before
 
 
 def test_result_is_labelled_and_exact(finished):

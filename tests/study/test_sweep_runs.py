@@ -20,6 +20,7 @@ from jffsr.study.sweep import local, running
 from jffsr.study.sweep.points import expand
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.tasks import sort_into_tasks
+from jffsr.viz.replay.of_sweep import sweep_replays
 
 
 @pytest.fixture(scope="module")
@@ -253,6 +254,27 @@ def test_a_call_that_fails_takes_no_other_with_it(base, finished, tmp_path, monk
     )
     assert sweep(base, *SWEPT, out=folder) == cli.NOT_MET
     assert (folder / "sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
+
+
+def test_the_report_shows_the_best_motions(finished, tmp_path, capsys):
+    file = tmp_path / "shared" / "sweep.html"
+    assert cli.main(["show", str(finished), "--report", str(file), "--no-serve"]) == cli.MET
+    assert str(file) in capsys.readouterr().out
+    text = file.read_text(encoding="utf-8")
+    assert len(text) < 3e6
+    dataset = open_dataset(finished / "sweep.nc")
+    replays = sweep_replays(finished)
+    assert len(replays) == min(4, dataset.sizes["point"] // 3)
+    for replay in replays:
+        # Each goes from the start to the goal in the time that its title names.
+        duration = float(replay.title.split("duration ")[1].split(",")[0])
+        assert replay.time[-1] == pytest.approx(duration)
+        assert f">{replay.title}</option>" in text
+        ends = np.array(
+            next(panel for panel in replay.panels if panel.title == "joint rates").curves["joint1"]
+        )
+        np.testing.assert_allclose(ends[[0, -1]], 0.0, atol=1e-9)
+    assert text.count("<tr>") > dataset.sizes["point"] // 3
 
 
 def test_tasks_share_shapes_and_are_alike_in_size(base):

@@ -78,9 +78,14 @@ def test_a_finished_run_is_told_and_shown(compared, capsys):
     assert run(compared, TWO) == cli.MET
     assert "is finished" in capsys.readouterr().out
     assert (compared / "summary.json").read_bytes() == before
-    assert cli.main(["show", str(compared)]) == cli.MET
+    assert cli.main(["show", str(compared), "--html", "--report"]) == cli.MET
     shown = capsys.readouterr().out
     assert "weak" in shown
+    for page in ("replay.html", "report.html"):
+        text = (compared / page).read_text(encoding="utf-8")
+        assert len(text) < 3e6
+        assert '<option value="1">' in text  # the plots of each tracker
+    assert "the way that was asked of the tool" in text
     figures = {path.name for path in (compared / "figures").iterdir()}
     assert {"tool_path.png", "pose_errors.pdf", "singular_values.png", "tracked_joints.png"} <= figures
 

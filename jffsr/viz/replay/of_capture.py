@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from jffsr.errors import InputError
 from jffsr.study.capture.building import CaptureStudy
 from jffsr.study.capture.reviewing import open_capture
 from jffsr.study.chain.reviewing import open_chain
@@ -17,7 +16,7 @@ from jffsr.study.reviewing import open_result
 from jffsr.viz.replay.curves import base_rate, run_name, torques
 from jffsr.viz.replay.of_robot import Extras, robot_replay
 from jffsr.viz.replay.of_target import capture_extras, target_solids
-from jffsr.viz.replay.replay import Replay
+from jffsr.viz.replay.replay import NothingMoved, Replay
 from jffsr.viz.scene import scene_of
 
 if TYPE_CHECKING:
@@ -25,10 +24,10 @@ if TYPE_CHECKING:
 
 
 def captured_replays(path: Path) -> list[Replay]:
-    """The motion to the grasp; InputError where no plan was found."""
+    """The motion to the grasp; NothingMoved where no plan was found."""
     folder, study, dataset, _ = open_capture(path)
     if "joint_position" not in dataset:
-        raise InputError(f"{folder.path}: the run found no plan, so that nothing moves in it")
+        raise NothingMoved(f"{folder.path}: the run found no plan, so that nothing moves in it")
     return [
         robot_replay(
             run_name(folder), study.robot, dataset, capture_extras(study.robot, study.geometry, dataset)
@@ -37,10 +36,10 @@ def captured_replays(path: Path) -> list[Replay]:
 
 
 def chained_replays(path: Path) -> list[Replay]:
-    """The approach and the hold after it; InputError for a chain that ended before anything moved."""
+    """The approach and the hold after it; NothingMoved for a chain that ended before anything moved."""
     folder, study, _, _, dataset = open_chain(path)
     if "joint_position" not in dataset or dataset.sizes["time"] < 2:
-        raise InputError(f"{folder.path}: the chain ended before anything moved")
+        raise NothingMoved(f"{folder.path}: the chain ended before anything moved")
     # Samples in which the hold begins where the approach ended are the same instant twice.
     time = dataset["time"].values
     dataset = dataset.isel(time=np.flatnonzero(np.concatenate([[True], np.diff(time) > 0])))

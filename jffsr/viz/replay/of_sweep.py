@@ -19,7 +19,7 @@ from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.table import rows_of
 from jffsr.types import Vector
 from jffsr.viz.replay.of_robot import robot_replay
-from jffsr.viz.replay.replay import Replay
+from jffsr.viz.replay.replay import NothingMoved, Replay
 
 SETTINGS = 4
 """How many settings are shown, those with the least cost."""
@@ -47,7 +47,7 @@ def sweep_replays(path: Path) -> list[Replay]:
             )
             chosen.append((float(row.cost[best]), int(row.points[best]), title or "best"))
     if not chosen:
-        raise InputError(f"{folder.path}: no point of this sweep has a motion to show")
+        raise NothingMoved(f"{folder.path}: no point of this sweep has a motion to show")
     chosen = sorted(chosen)[:SETTINGS]
     return [
         _replay(

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from jffsr.errors import InputError
 from jffsr.study.reviewing import open_tracking
 from jffsr.viz.replay.curves import positive, run_name, while_finite
 from jffsr.viz.replay.of_robot import Extras, robot_replay
-from jffsr.viz.replay.replay import Panel, Replay, Way
+from jffsr.viz.replay.replay import NothingMoved, Panel, Replay, Way
 
 _ASKED = (0.20, 0.60, 0.35)
 
 
 def tracked_replays(path: Path) -> list[Replay]:
-    """The motion of every tracker, up to where it was lost; InputError where none moved."""
+    """The motion of every tracker, up to where it was lost; NothingMoved where none moved."""
     folder, task, dataset = open_tracking(path)
     found = []
     for label in dataset["tracker"].values:
@@ -54,5 +53,5 @@ def tracked_replays(path: Path) -> list[Replay]:
         name = str(label) or run_name(folder)
         found.append(robot_replay(name, task.robot, one, extras, dataset.sizes["tracker"]))
     if not found:
-        raise InputError(f"{folder.path}: no tracker of this run moved")
+        raise NothingMoved(f"{folder.path}: no tracker of this run moved")
     return found

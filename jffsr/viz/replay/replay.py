@@ -11,6 +11,13 @@ from itertools import product
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from jffsr.errors import InputError
+
+
+class NothingMoved(InputError):
+    """A run without a motion, such as a search that found no plan."""
+
+
 Colour = tuple[float, float, float]
 """Red, green and blue in [0, 1]."""
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from jffsr.errors import InputError
 from jffsr.study.kinds import summary_text
 from jffsr.study.run_folder import RunFolder
 from jffsr.viz.replay.reading import replays_of
+from jffsr.viz.replay.replay import NothingMoved, Replay
 from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
 from jffsr.viz.report.replay_block import replay_block
@@ -42,7 +42,7 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         f"<h1>{escape(name)}</h1>",
         f'<p class="kind">{_KINDS[summary["kind"]]} &middot; robot {escape(str(summary["robot"]))}</p>',
         verdict(summary["result"]),
-        section("The motion", _replay(folder.path, name)),
+        section("The motion", motion(lambda: replays_of(folder.path), name)),
         section("The task", _task(config, folder)),
         section("The result", _result(summary)),
         section("Verification", measured(_verification(summary))),
@@ -80,14 +80,12 @@ def made(summary: Mapping[str, Any], command: str) -> str:
     return table(("", ""), [*rows, ("versions", versions)])
 
 
-def _replay(path: Path, name: str) -> str:
+def motion(find: Callable[[], Sequence[Replay]], name: str) -> str:
+    """The replays that `find` returns, or in words why there are none."""
     try:
-        replays = replays_of(path)
-    except InputError as error:
-        if (path / "summary.json").is_file() and "mov" in str(error):
-            return f"<p>{escape(str(error))}</p>"
-        raise
-    return replay_block(replays, name)
+        return replay_block(find(), name)
+    except NothingMoved as error:
+        return f"<p>{escape(str(error))}</p>"
 
 
 def _task(config: Mapping[str, Any], folder: RunFolder) -> str:

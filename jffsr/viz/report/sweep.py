@@ -13,9 +13,12 @@ from jffsr.study.sweep.folder import SweepFolder
 from jffsr.viz.replay.of_sweep import sweep_replays
 from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
-from jffsr.viz.report.replay_block import replay_block
-from jffsr.viz.report.report import made, section, verdict
+from jffsr.viz.report.report import made, motion, section, verdict
 from jffsr.viz.report.tables import flattened, table
+
+_BEST = (
+    "<p>The best point of each of the settings that cost least, computed again from what the sweep kept.</p>"
+)
 
 
 def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
@@ -40,16 +43,10 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
         section("What was varied", table(("", ""), list(flattened(varied))) + whole),
         section("What was found", from_markdown(found)),
         section("Figures", figures_block(figures)),
-        section("The best motions", _replay(folder.path, name)),
+        section("The best motions", _BEST + motion(lambda: sweep_replays(folder.path), name)),
         section("How it was made", made(summary, f"jffsr sweep {folder.config.name}")),
     ]
     return page(name, "\n".join(part for part in parts if part))
-
-
-def _replay(path: Path, name: str) -> str:
-    replays = sweep_replays(path)
-    words = "<p>The best point of each of the settings that cost least, computed again from what the sweep kept.</p>"
-    return words + replay_block(replays, name)
 
 
 def from_markdown(text: str) -> str:
