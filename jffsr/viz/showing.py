@@ -7,6 +7,7 @@ from pathlib import Path
 
 from jffsr.errors import InputError
 from jffsr.study.run_folder import RunFolder
+from jffsr.viz.replay.momenta import with_one_scale
 from jffsr.viz.replay.replay import Replay
 from jffsr.writing import write_atomically
 
@@ -44,7 +45,7 @@ def replays_of_all(paths: Sequence[str | Path]) -> list[Replay]:
         found += replays
     if len(found) > _MOST:
         raise InputError(f"these runs hold {len(found)} motions; at most {_MOST} are shown side by side")
-    return found
+    return with_one_scale(found)
 
 
 def write_page(paths: Sequence[str | Path], file: Path) -> Path:

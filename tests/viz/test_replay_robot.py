@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import chex
 import jax
 import numpy as np
@@ -12,6 +14,7 @@ from viz_runs import run_dataset
 import jffsr
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.robots.robot import Limits
+from jffsr.viz.replay.momenta import legend_of, with_one_scale
 from jffsr.viz.replay.of_robot import Extras, joint_nearness, robot_replay
 
 STEP = 1e-5
@@ -107,7 +110,21 @@ def test_arrows_are_the_momenta_of_the_parts(shown):
     scale = np.linalg.norm(base) / np.linalg.norm(each[0])
     np.testing.assert_allclose(base, scale * each[0], rtol=1e-5, atol=1e-8)
     np.testing.assert_allclose(arm, scale * each[1:].sum(axis=0), rtol=1e-5, atol=1e-8)
-    assert "N m s" in " ".join(replay.legend)
+    assert replay.arrows[0].scale == pytest.approx(1 / scale)
+    largest = np.linalg.norm(each[0])
+    said = float(legend_of([replay])[-1].split("the longest is ")[1].split(" N m s")[0])
+    lengths = [np.linalg.norm(arrow.vector, axis=1).max() for arrow in replay.arrows]
+    assert said == pytest.approx(max(lengths) / np.linalg.norm(base) * largest, rel=1e-2)
+
+
+def test_arrows_side_by_side_have_one_scale(shown):
+    _, _, replay = shown
+    larger = replace(replay, arrows=tuple(replace(arrow, scale=3.0 * arrow.scale) for arrow in replay.arrows))
+    first, second = with_one_scale([replay, larger])
+    for one, other in zip(first.arrows, second.arrows, strict=True):
+        assert one.scale == other.scale
+        np.testing.assert_allclose(3.0 * one.vector, other.vector)
+    assert sum("Arrows" in line for line in legend_of([first, second])) == 1
 
 
 def test_nothing_is_said_of_momentum_where_nothing_moves(robots):
@@ -117,7 +134,7 @@ def test_nothing_is_said_of_momentum_where_nothing_moves(robots):
     data["joint_velocity"] *= 0.0
     replay = robot_replay("still", robot, data)
     assert replay.arrows == ()
-    assert not any("Arrows" in line for line in replay.legend)
+    assert not any("Arrows" in line for line in legend_of([replay]))
 
 
 def test_nearness_is_one_at_the_limit(shown):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,10 +14,11 @@ from jffsr.dynamics.kinematics import kinematics, system_com
 from jffsr.dynamics.momentum import momentum
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
-from jffsr.viz.replay.replay import Arrow, Colour
+from jffsr.viz.replay.replay import Arrow, Colour, Replay
 
 BASE_COLOUR: Colour = (0.16, 0.45, 0.85)
 ARMS_COLOUR: Colour = (0.92, 0.45, 0.10)
+_MOMENTUM = "momentum of the"
 _LEAST = 1e-9  # N m s, below which there is nothing to draw
 
 
@@ -33,24 +37,41 @@ def angular_momenta(robot: Robot, states: State):
     return jax.vmap(at)(states)
 
 
-def momentum_arrows(
-    robot: Robot, states: State, origin: np.ndarray, longest: float
-) -> tuple[tuple[Arrow, ...], str]:
-    """Arrows of the base's and the arms' angular momentum from origin (F, 3), and what a legend says of them.
+def momentum_arrows(robot: Robot, states: State, origin: np.ndarray, longest: float) -> tuple[Arrow, ...]:
+    """Arrows of the base's and the arms' angular momentum, N m s, from origin (F, 3); the longest is `longest`, m.
 
-    The longest of all is `longest`, m. Nothing where the robot hardly has any.
+    Nothing where the robot hardly has any.
     """
     base, whole = jax.device_get(angular_momenta(robot, states))
     parts = {"base": (base, BASE_COLOUR), "arm": (whole - base, ARMS_COLOUR)}
     largest = max(float(np.linalg.norm(vector, axis=1).max()) for vector, _ in parts.values())
     if not np.isfinite(largest) or largest < _LEAST:
-        return (), ""
-    scale = longest / largest
-    arrows = tuple(
-        Arrow(f"momentum of the {name}", origin, scale * vector, colour)
+        return ()
+    scale = largest / longest
+    return tuple(
+        Arrow(f"{_MOMENTUM} {name}", origin, vector / scale, colour, scale)
         for name, (vector, colour) in parts.items()
     )
-    return arrows, (
-        "Arrows: angular momentum about the centre of mass, blue of the base, orange of the arm; "
-        f"the longest is {largest:.3g} N m s."
-    )
+
+
+def with_one_scale(replays: Sequence[Replay]) -> list[Replay]:
+    """The replays with arrows that can be compared: a metre stands for as much in all, none longer than it was."""
+    scale = max((arrow.scale for replay in replays for arrow in replay.arrows), default=1.0)
+
+    def scaled(arrow: Arrow) -> Arrow:
+        return replace(arrow, vector=arrow.vector * (arrow.scale / scale), scale=scale)
+
+    return [replace(replay, arrows=tuple(map(scaled, replay.arrows))) for replay in replays]
+
+
+def legend_of(replays: Sequence[Replay]) -> list[str]:
+    """What there is to know of replays that are seen together, in sentences."""
+    lines = list(dict.fromkeys(line for replay in replays for line in replay.legend))
+    arrows = [arrow for replay in replays for arrow in replay.arrows if arrow.name.startswith(_MOMENTUM)]
+    if arrows:
+        largest = max(arrow.scale * np.linalg.norm(arrow.vector, axis=1).max() for arrow in arrows)
+        lines.append(
+            "Arrows: angular momentum about the centre of mass, blue of the base, orange of the arm; "
+            f"the longest is {largest:.3g} N m s."
+        )
+    return lines

@@ -64,9 +64,7 @@ def robot_replay(
     # Above the base, which hides the centre of mass.
     over = scene.com.copy()
     over[:, 2] = scene.base_faces[..., 2].max() + 0.05 * reach
-    arrows, words = momentum_arrows(
-        robot, State(*(thin[name].values for name in _STATE)), over, _ARROW * reach
-    )
+    arrows = momentum_arrows(robot, State(*(thin[name].values for name in _STATE)), over, _ARROW * reach)
     near = joint_nearness(robot, dataset)
     solids = tuple(
         _robot_solids(robot, scene, near[chosen], {k: v[chosen] for k, v in extras.nearness.items()})
@@ -97,7 +95,6 @@ def robot_replay(
         marks=extras.marks,
         legend=(
             "Joints and bodies turn amber and then red as they come near a limit of theirs.",
-            *((words,) if words else ()),
             *extras.legend,
         ),
     )

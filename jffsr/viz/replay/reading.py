@@ -6,6 +6,7 @@ import importlib
 from pathlib import Path
 
 from jffsr.study.run_folder import RunFolder
+from jffsr.viz.replay.momenta import with_one_scale
 from jffsr.viz.replay.replay import Replay
 
 _READERS = {
@@ -27,4 +28,4 @@ def replays_of(path: str | Path) -> list[Replay]:
     kind = folder.read_config().kind
     folder.read_summary()
     module, _, function = _READERS[kind].partition(":")
-    return getattr(importlib.import_module(f"jffsr.viz.replay.{module}"), function)(path)
+    return with_one_scale(getattr(importlib.import_module(f"jffsr.viz.replay.{module}"), function)(path))

@@ -52,12 +52,16 @@ class Way:
 
 @dataclass(frozen=True)
 class Arrow:
-    """A vector at a place: origin (F, 3), m, and vector (F, 3) as long as it is drawn, m."""
+    """A vector at a place: origin (F, 3), m, and vector (F, 3) as long as it is drawn, m.
+
+    One metre of it stands for `scale` of its unit.
+    """
 
     name: str
     origin: np.ndarray
     vector: np.ndarray
     colour: Colour
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

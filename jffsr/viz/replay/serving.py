@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jffsr.viz.replay.live_plots import LivePlots
+from jffsr.viz.replay.momenta import legend_of
 from jffsr.viz.replay.recording import all_times
 from jffsr.viz.replay.replay import Replay
 from jffsr.viz.replay.viser_scene import ReplayScene
@@ -54,7 +55,7 @@ class ReplayPlayer:
                 box = gui.add_checkbox(label, True)
                 box.on_update(lambda _, kind=kind, box=box: self.scene.hide(kind, not box.value))
         self._plots = LivePlots(gui, replays)
-        for line in dict.fromkeys(line for replay in replays for line in replay.legend):
+        for line in legend_of(replays):
             gui.add_markdown(f"*{line}*")
 
     def _slid(self, event: Any) -> None:

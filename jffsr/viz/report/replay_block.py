@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 
+from jffsr.viz.replay.momenta import legend_of
 from jffsr.viz.replay.recording import all_times, record_html
 from jffsr.viz.replay.replay import Panel, Replay
 from jffsr.viz.report.plots import Plot, draw_panel, points_each
@@ -40,9 +41,7 @@ def replay_block(replays: Sequence[Replay], title: str) -> str:
             for number, replay in enumerate(replays)
         )
         tabs = f'<label class="choice">Plots of <select id="replay-choice">{options}</select></label>'
-    legend = "".join(
-        f"<li>{escape(line)}</li>" for line in dict.fromkeys(line for r in replays for line in r.legend)
-    )
+    legend = "".join(f"<li>{escape(line)}</li>" for line in legend_of(replays))
     numbers = json.dumps({"start": float(all_times(replays)[0]), "plots": data}, separators=(",", ":"))
     numbers = numbers.replace("</", "<\\/")
     return f"""<section class="replay" id="replay">
