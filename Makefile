@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-browser check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -56,6 +56,12 @@ check-capture: $(STAMP)  ## run the heavier checks of target, clearance and capt
 
 captures: $(STAMP)  ## plan a thousand random captures twice (goes on where it was stopped)
 	$(VENV_PYTHON) -m experiments.captures
+
+check-browser: $(STAMP)  ## look at pages and served replays in a real browser (installs one where there is none)
+	$(if $(UV),"$(UV)" pip install --quiet --python "$(VENV_PYTHON)",\
+	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check) -e '.[test,browser]' -c constraints.txt
+	$(VENV_PYTHON) tests/browser/install_browser.py
+	$(VENV_PYTHON) -m pytest -m browser tests/browser $(PYTEST_ARGS)
 
 check-native: $(STAMP)  ## check the benchmark's C++ kernel against the package (needs a C++ compiler)
 	$(PYTEST) -m native $(PYTEST_ARGS)
@@ -103,7 +109,7 @@ lint: $(STAMP)  ## check style and format
 # The list must not name a registry: whoever installs uses their own.
 constraints:  ## choose the pinned versions anew (needs uv)
 	@test -n "$(UV)" || { echo "make constraints needs uv on PATH (pip install uv)." >&2; exit 1; }
-	"$(UV)" pip compile --quiet --universal --upgrade --extra test --extra cluster --python-version 3.11 --no-header --no-annotate \
+	"$(UV)" pip compile --quiet --universal --upgrade --extra test --extra cluster --extra browser --python-version 3.11 --no-header --no-annotate \
 	    --no-emit-index-url --no-emit-find-links --output-file constraints.txt pyproject.toml
 	@! grep -nE '://|^-| @ ' constraints.txt || { echo "constraints.txt names a registry or a path." >&2; exit 1; }
 
