@@ -189,7 +189,7 @@ def test_a_served_replay_is_seen_and_can_be_moved(browser):
         now = player.now
         page.page.wait_for_timeout(1000)
         assert player.now > now
-        page.page.locator("input[type=checkbox]").first.evaluate("box => box.click()")
+        page.page.get_by_role("button", name="pause").click()
         page.page.wait_for_timeout(1500)
         paused = player.now
         page.page.wait_for_timeout(1000)
@@ -199,6 +199,9 @@ def test_a_served_replay_is_seen_and_can_be_moved(browser):
         field.press("Enter")
         page.page.wait_for_timeout(1500)
         assert player.now == pytest.approx(12.0, abs=0.1)
+        page.page.get_by_role("button", name="play").click()
+        page.page.wait_for_timeout(1500)
+        assert player.now > 12.1
         assert page.errors == []
         assert page.asked_outside(player.url) == []
         page.context.close()

@@ -85,10 +85,15 @@ class _Curves:
 
     def scales(self, logarithmic: bool) -> dict[str, dict]:
         """What the axes span: all of the motion."""
-        pad = 0.0 if logarithmic else 0.05 * (self._high - self._low) or 1.0
-        upright = {"range": (float(self._low - pad), float(self._high + pad))}
+        if logarithmic:
+            # The chart divides whole decades.
+            low, high = 10.0 ** np.floor(np.log10(self._low)), 10.0 ** np.ceil(np.log10(self._high))
+            upright = {"range": (float(low), float(max(high, 10.0 * low))), "distr": 3}
+        else:
+            pad = 0.05 * (self._high - self._low) or 1.0
+            upright = {"range": (float(self._low - pad), float(self._high + pad))}
         across = {"time": False, "range": (float(self._time[0]), float(self._time[-1]))}
-        return {"x": across, "y": {**upright, **({"distr": 3} if logarithmic else {})}}
+        return {"x": across, "y": upright}
 
     def series(self) -> tuple[dict, ...]:
         """How the chart draws each."""

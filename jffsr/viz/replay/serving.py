@@ -20,6 +20,7 @@ _TICK = 1.0 / 30.0  # s
 _PLOTS = 3
 """Every so many pictures the plots are drawn anew."""
 _SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x", "8x")
+_PLAY, _PAUSE = "play", "pause"
 _KINDS = {"ways": "ways of base and tools", "arrows": "momentum", "axes": "axes of tools and targets"}
 
 
@@ -47,7 +48,8 @@ class ReplayPlayer:
         self._slider = gui.add_slider(
             "time [s]", min=self._first, max=self._last, step=step, initial_value=self._first
         )
-        self._playing = gui.add_checkbox("play", True)
+        self._playing, self._button = True, gui.add_button(_PAUSE)
+        self._button.on_click(lambda _: self.play(not self._playing))
         self._speed = gui.add_dropdown("speed", _SPEEDS, initial_value="1x")
         self._slider.on_update(self._slid)
         with gui.add_folder("show", expand_by_default=False):
@@ -63,7 +65,12 @@ class ReplayPlayer:
         if event.client is None:
             return
         self._now = float(self._slider.value)
-        self._playing.value = False
+        self.play(False)
+
+    def play(self, playing: bool) -> None:
+        """Play on, or stand still."""
+        self._playing = playing
+        self._button.label = _PAUSE if playing else _PLAY
 
     def go_to(self, instant: float) -> None:
         """Move all that is shown to an instant, s."""
@@ -77,7 +84,7 @@ class ReplayPlayer:
 
     def advance(self, seconds: float) -> None:
         """Let so much of the viewer's time pass: on from the end, the motion begins anew."""
-        if self._playing.value:
+        if self._playing:
             self._now += seconds * float(self._speed.value.removesuffix("x"))
             if self._now > self._last:
                 self._now = self._first
@@ -89,9 +96,9 @@ class ReplayPlayer:
         self._drawn = self._now
         self.scene.show(self._now)
         self._pictures += 1
-        if not self._playing.value or self._pictures % _PLOTS == 0:
+        if not self._playing or self._pictures % _PLOTS == 0:
             self._plots.show(self._now)
-        if self._playing.value:
+        if self._playing:
             self._slider.value = self._now
 
     def run(self, stop: Callable[[], bool] = lambda: False) -> None:
