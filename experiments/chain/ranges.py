@@ -107,7 +107,7 @@ def tables(recorded: dict[int, dict], again: dict[int, dict]) -> str:
             start, most, end = found["used"]["with"]
             braked = found["used"]["braked"]
             _, free_most, free_end = found["used"]["without"]
-            shares = " | ".join(f"{share:.4f}" for share in (start, free_most, most, braked, free_end, end))
+            shares = " | ".join(f"{share:.5f}" for share in (start, free_most, most, braked, free_end, end))
             rows.append(f"| {number} | {found['momentum']:.2f} | {shares} |")
     return "\n".join(rows)
 

@@ -51,4 +51,4 @@ def test_chains_run_again_are_counted_by_what_they_were(tmp_path):
     rows = [row for row in tables(recorded, again).splitlines() if row.startswith("| ")]
     assert rows[1].startswith("| a joint left its range: 3 | 3 | 2 | 1 | 0 | 0.001, 0.002 |")
     assert rows[2].startswith("| grasped and held: 2 | 1 | 1 | 0 | 0 | 0.001, 0.005 |")
-    assert rows[4:] == ["| 3 | 5.00 | 0.9900 | 1.7000 | 1.5000 | 1.2500 | 1.6000 | 0.9000 |"]
+    assert rows[4:] == ["| 3 | 5.00 | 0.99000 | 1.70000 | 1.50000 | 1.25000 | 1.60000 | 0.90000 |"]
