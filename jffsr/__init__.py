@@ -185,6 +185,7 @@ _HOME = {
     "RegressedLoad": "jffsr.reactionless.estimation.models",
     "LoadParameters": "jffsr.reactionless.estimation.parameters",
     "AdaptiveReactionless": "jffsr.reactionless.estimation.adaptive",
+    "RangesKept": "jffsr.reactionless.ranges",
     "Settings": "jffsr.optimizers.registry",
     "composite_index": "jffsr.objectives.composite",
     "solve": "jffsr.planning.plan",

@@ -4,7 +4,8 @@ Random captures (those of `experiments.captures`, from a seed of their own), eac
 sees the box for 300 s with a marker somewhere on it and a rough guess of its inertia, and all the rest follows. Every
 run keeps its folder, so that the same command goes on where it was stopped.
 
-Run it from the root of the repository: `python -m experiments.chain`; `--part 0/2` and `--part 1/2` share the work.
+Run it from the root of the repository: `python -m experiments.chain`; `--part 0/2` and `--part 1/2` share the work;
+`--seeds 16,23` runs the samples of these numbers alone, and writes no page.
 """
 
 from __future__ import annotations
@@ -78,11 +79,16 @@ def _text(value) -> str:
     return repr(float(value)) if isinstance(value, float | np.floating) else str(value)
 
 
+def _whole_numbers(text: str) -> list[int]:
+    return [int(word) for word in text.split(",")]
+
+
 def main() -> None:
     """Run what is missing, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=100, help="chains")
     parser.add_argument("--part", default="0/1", help="which share of them, such as 0/2")
+    parser.add_argument("--seeds", type=_whole_numbers, help="these alone, such as 16,23; no page is written")
     parser.add_argument("--folder", default="runs/chain")
     parser.add_argument("--out", default="docs/benchmarks/chain.md")
     arguments = parser.parse_args()
@@ -90,7 +96,7 @@ def main() -> None:
     keep_programs()
     part, parts = (int(number) for number in arguments.part.split("/"))
     folder, summaries = Path(arguments.folder), {}
-    numbers = first_feasible(read_seed(SEED), arguments.count)
+    numbers = arguments.seeds or first_feasible(read_seed(SEED), arguments.count)
     for number in numbers:
         path = folder / f"{number:04d}"
         if numbers.index(number) % parts != part:
@@ -99,7 +105,7 @@ def main() -> None:
         summary = run_chain(config, path).summary
         summaries[number] = summary
         print(number, summary["result"]["sentence"], flush=True)
-    if parts == 1:
+    if parts == 1 and arguments.seeds is None:
         write_page(Path(arguments.out), summaries)
 
 

@@ -31,7 +31,7 @@ def write_page(page: Path, summaries: dict[int, dict]) -> None:
     fill(
         page, tables(list(summaries.values())), "The whole chain: from a camera's first pose to a still base"
     )
-    lines = [json.dumps({"number": number} | _line(summary)) for number, summary in summaries.items()]
+    lines = [json.dumps({"number": number} | line(summary)) for number, summary in summaries.items()]
     page.with_suffix(".jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -73,11 +73,13 @@ def _shortened(sentence: str) -> str:
     return sentence.split("(")[0].split(";")[0].split(":")[0].strip()
 
 
-def _line(summary: dict) -> dict:
+def line(summary: dict) -> dict:
+    """What is kept of a chain beside the page."""
     kept = {"code": summary["result"]["code"], "sentence": summary["result"]["sentence"]}
     if summary["approach"]:
         kept["grasp_error"] = summary["approach"]["grasp_error"]
     if summary["hold"]:
         kept["base_rate"], kept["turned"] = summary["hold"]["base_rate"], summary["hold"]["turned"]
+        kept["range_used"] = summary["hold"]["range_used"]
         kept["momentum"] = float(np.linalg.norm(summary["contact"]["momentum"][3:]))
     return kept

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 
 from jffsr.dynamics.kinematics import Kinematics, kinematics
 from jffsr.dynamics.momentum import generalized_jacobian
-from jffsr.robots.robot import Robot
+from jffsr.robots.robot import Limits, Robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply, quaternion_to_rotation_vector
 from jffsr.spatial.safe import safe_norm
@@ -49,14 +49,20 @@ class SecondaryTask(Protocol):
     ) -> tuple[Vector, Matrix]: ...
 
 
-def limit_gradient(robot: Robot, joint_position: Vector) -> Vector:
-    """Gradient (n,) of the mean of ((q - mid)/half range)^2/2 over the joints; zero for joints without limits."""
-    limits, q = robot.limits, joint_position
+def range_share(limits: Limits, joint_position: Array) -> tuple[Array, Vector]:
+    """Joint positions (..., n) as a share of the way from the middle of the range to its end, -1 and 1 being the ends,
+    and half the ranges (n,); zero and 1 for joints without both limits."""
     lower, upper = jnp.asarray(limits.position_lower), jnp.asarray(limits.position_upper)
     bounded = jnp.isfinite(lower) & jnp.isfinite(upper)
     half = jnp.where(bounded, 0.5 * (upper - lower), 1.0)
-    middle = jnp.where(bounded, 0.5 * (upper + lower), q)
-    return (q - middle) / (half**2 * q.size)
+    middle = jnp.where(bounded, 0.5 * (upper + lower), joint_position)
+    return (joint_position - middle) / half, half
+
+
+def limit_gradient(robot: Robot, joint_position: Vector) -> Vector:
+    """Gradient (n,) of the mean of ((q - mid)/half range)^2/2 over the joints; zero for joints without limits."""
+    share, half = range_share(robot.limits, joint_position)
+    return share / (half * joint_position.size)
 
 
 @jax.tree_util.register_dataclass

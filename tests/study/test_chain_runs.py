@@ -104,6 +104,8 @@ def test_a_grasp_counts_only_within_its_tolerances(config):
         ("grasp_tolerance.attitud=1", "grasp_tolerance.attitud:.*attitude"),
         ("approach.step=1", "approach.step: found 1"),
         ("hold.estimator=rls", "hold.estimator: found 'rls'"),
+        ("hold.ranges.begin=1", "hold.ranges.begin: found 1, a number in \\[0, 1\\) is expected"),
+        ("hold.ranges.gian=1", "hold.ranges.gian: unknown key; did you mean 'gain'"),
     ],
 )
 def test_bad_input_is_told_in_one_sentence(config, override, sentence, tmp_path, capsys):

@@ -14,6 +14,7 @@ from jffsr.reactionless.estimation.balance import balance_of
 from jffsr.reactionless.estimation.models import LoadModel
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.reactionless.null_space import ALL_AXES, absorbing, attitude_task, checked_axes, coupling_rank
+from jffsr.reactionless.ranges import RangesKept
 from jffsr.robots.robot import Robot
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply, quaternion_to_rotation_vector
 from jffsr.spatial.safe import safe_norm
@@ -59,16 +60,18 @@ class AdaptiveState:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class AdaptiveReactionless:
-    """A `Reference`: qd = H# (L + gain H_w e) + s (1 - H# H) zeta(t), with the blocks that the model estimates.
+    """A `Reference`: qd = H# (L + gain H_w e) + r + s (1 - H# H) zeta(t), with the blocks that the model estimates.
 
     robot: without its load; model: learns the load; period, s, of the samples; null_rate: zeta (n,), rad/s, at a
     time, None for none. rate_limit (n,) or scalar, rad/s: s is the largest share in [0, 1] of the null motion that
     keeps it, and if the rest exceeds it alone, that is scaled down and the state says so. acceleration_limit,
     rad/s^2: how fast commanded rates may change. attitude_gain, 1/s: feeds back the base's rotation e since the
     start. rank_cut: singular values of the estimated coupling below that share of the largest are taken for errors
-    of the estimate. axes, static: those of B to hold; a planar arm can hold only the one it turns about, and what
-    noise makes of the others is not to be answered. learn, static: false keeps the model as it begins. end_effector,
-    static: what carries the load, None the first.
+    of the estimate. ranges: makes the part r of the null space that leads joints off the ends of their ranges, before
+    zeta, which it turns aside there, and like it only as far as the rate limits allow; None for none. axes, static:
+    those of B to hold; a planar arm can hold only the one it turns about, and what noise makes of the others is not to
+    be answered. learn, static: false keeps the model as it begins. end_effector, static: what carries the load, None
+    the first.
     """
 
     robot: Robot
@@ -79,6 +82,7 @@ class AdaptiveReactionless:
     acceleration_limit: Array | float = jnp.inf
     attitude_gain: Array | float = 0.0
     rank_cut: Array | float = 1e-3
+    ranges: RangesKept | None = None
     axes: tuple[int, ...] = field(default=ALL_AXES, metadata={"static": True})
     learn: bool = field(default=True, metadata={"static": True})
     end_effector: str | None = field(default=None, metadata={"static": True})
@@ -114,7 +118,12 @@ class AdaptiveReactionless:
         least, space, sigma = absorbing(task, wanted, self.rank_cut)
         unabsorbed = safe_norm(wanted - task @ least) > _UNABSORBED * safe_norm(wanted)
         zeta = jnp.zeros_like(least) if self.null_rate is None else space @ self.null_rate(time)
-        rates, limited = _within(least, zeta, self.rate_limit)
+        aside = jnp.zeros_like(least)
+        if self.ranges is not None:
+            gain, inward = self.ranges.correction(self.robot.limits, position, space)
+            aside, zeta = gain @ (inward - least), zeta - gain @ zeta
+        rates, limited = _within(least, aside, self.rate_limit)
+        rates, _ = _within(rates, zeta, self.rate_limit)
         finite = jnp.all(jnp.isfinite(rates))
         rates = jnp.where(finite, rates, state.joint_velocity)
         change = rates - state.joint_velocity

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jffsr.capture.contact_compound import Compound
 from jffsr.errors import InputError
+from jffsr.reactionless.estimation.models import KnownLoad
 from jffsr.robots.state import State
 from jffsr.study.atomic import write_json
 from jffsr.study.capture.building import CaptureStudy, build_study
@@ -33,20 +35,29 @@ def open_chain(path: str | Path) -> tuple[RunFolder, CaptureStudy, Any, Any, Any
     return folder, study, plan, observation, open_result(folder, folder.result, "time")
 
 
-def check_run(path: str | Path) -> HoldCheck:
-    """The hold of a finished chain with MuJoCo as the plant, beside ours; the report goes into the run's summary.
+def grasp_of(path: str | Path) -> tuple[RunFolder, CaptureStudy, Compound, KnownLoad]:
+    """The folder and study of a finished chain, robot and target as one at its grasp, and the load that was grasped.
 
-    The approach was driven in MuJoCo as the chain ran. Raises InputError for a chain that ended before the hold.
+    Raises InputError for a chain that ended before the hold.
     """
     folder, study, _, _, _ = open_chain(path)
-    config, summary = folder.read_config(), folder.read_summary()
+    summary = folder.read_summary()
     if summary["hold"] is None:
         raise InputError(f"{folder.path}: the chain ended before the hold ({summary['result']['sentence']})")
     approached = open_result(folder, folder.path / APPROACH, "target_angular_velocity").isel(time=-1)
     state = State(*(approached[name].to_numpy() for name in _STATE))
     target_state = TargetState(*(approached[name].to_numpy() for name in _TARGET))
     compound = compound_of(study.robot, state, study.target, target_state, study.end_effector)
-    known = known_load(study, state, target_state, compound)
+    return folder, study, compound, known_load(study, state, target_state, compound)
+
+
+def check_run(path: str | Path) -> HoldCheck:
+    """The hold of a finished chain with MuJoCo as the plant, beside ours; the report goes into the run's summary.
+
+    The approach was driven in MuJoCo as the chain ran. Raises InputError for a chain that ended before the hold.
+    """
+    folder, study, compound, known = grasp_of(path)
+    config, summary = folder.read_config(), folder.read_summary()
     both = [hold_of(config, study, compound, known, in_mujoco=where) for where in (True, False)]
     found = check_of([("hold", *both)])
     summary["verification"]["mujoco"] = found.to_dict()

@@ -29,9 +29,11 @@ from jffsr.reactionless.plant import closed_loop
 from jffsr.reactionless.plant_mujoco import closed_loop_mujoco
 from jffsr.reactionless.plant_run import LoopCode, LoopRun, loop_sentence
 from jffsr.reactionless.plant_settings import JointDisturbance, LoopSettings, Sensors, Strike
+from jffsr.reactionless.ranges import RangesKept
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.study.reactionless.schema_hold import Hold
+from jffsr.tracking.redundancy import range_share
 from jffsr.types import Array
 
 _VARIANCE = 1e-2
@@ -103,6 +105,7 @@ def hold_still(
         rate_limit=limits.velocity if hold.limits else free,
         acceleration_limit=limits.acceleration if hold.limits else free,
         attitude_gain=hold.attitude_gain,
+        ranges=ranges_kept(hold, robot),
         axes=tuple("xyz".index(axis) for axis in sorted(hold.axes)),
         end_effector=end_effector,
     )
@@ -114,6 +117,14 @@ def hold_still(
         return tuple(_judged(hold, robot, jax.device_get(run)) for run in loops)
     runs = jax.device_get(_runs(whole, state, reference, controller, settings, keys))
     return tuple(_judged(hold, robot, jax.tree.map(lambda x, k=k: x[k], runs)) for k in range(seeds))
+
+
+def ranges_kept(hold: Hold, robot: Robot) -> RangesKept | None:
+    """What leads the joints off the ends of their ranges; None where that is not wanted, or no joint has a range."""
+    ends = np.stack([robot.limits.position_lower, robot.limits.position_upper])
+    if hold.ranges is None or not np.any(np.all(np.isfinite(ends), axis=0)):
+        return None
+    return RangesKept(hold.ranges.begin, hold.ranges.gain)
 
 
 def load_model(hold: Hold, known: KnownLoad) -> LoadModel:
@@ -195,14 +206,9 @@ def _judged(hold: Hold, robot: Robot, run: LoopRun) -> Held:
     rates = np.linalg.norm(run.states.base_twist[:, 3:], axis=1)
     last = run.time >= run.time[-1] - hold.settled
     turned = attitude_difference(run.states.base_quaternion[0], run.states.base_quaternion[-1])
-    lower, upper = np.asarray(robot.limits.position_lower), np.asarray(robot.limits.position_upper)
-    bounded = np.isfinite(lower) & np.isfinite(upper)
-    used = 0.0
-    if np.any(bounded):
-        middle, half = (lower + upper)[bounded] / 2, (upper - lower)[bounded] / 2
-        used = float(np.max(np.abs(run.states.joint_position[:, bounded] - middle) / half))
+    share, _ = range_share(robot.limits, run.states.joint_position)
     settled = float(np.sqrt(np.mean(rates[last] ** 2)))
-    return Held(run, settled, float(turned), used, hold.base_rate)
+    return Held(run, settled, float(turned), float(np.abs(share).max()), hold.base_rate)
 
 
 def _per_joint(value: float | tuple[float, ...], robot: Robot, where: str) -> np.ndarray:

@@ -98,6 +98,13 @@ class Excitation(Section):
         return self
 
 
+class Ranges(Section):
+    """Joints led off the ends of their ranges, in the null space of the base's motion."""
+
+    begin: Annotated[float, number(ge=0, lt=1)] = 0.9  # share of the way from the range's middle to its end
+    gain: Positive = 0.2  # 1/s, of the way beyond that place
+
+
 class Hold(Section):
     """The base held still after the grasp, the target's mass and inertia unknown to reference and controller."""
 
@@ -116,6 +123,7 @@ class Hold(Section):
     )  # of the base that are held; a planar arm can hold only the one it turns about
     attitude_gain: NotNegative = 0.0  # 1/s, back to the attitude at the start
     limits: Annotated[bool, flag()] = True  # the robot's joint rates, accelerations and torques are kept
+    ranges: Ranges | None = Ranges()  # null: the joints' position ranges are not looked at
     sensors: Sensors = Sensors()
     disturbance: Disturbance = Disturbance()
     settled: Annotated[float, number(gt=0, unit="s")] = (
