@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from jffsr.robots.geometry import VISUAL
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.tracking.redundancy import range_share
 from jffsr.viz.hold import turned_by
 from jffsr.viz.replay.bodies import Part, robot_parts
 from jffsr.viz.replay.momenta import momentum_arrows
@@ -116,13 +117,9 @@ def thinned(solid: Solid, chosen: np.ndarray) -> Solid:
 
 def joint_nearness(robot: Robot, dataset: Dataset) -> np.ndarray:
     """How near its limits each joint is, (N, n): the larger of its shares of half the range and of the rate limit."""
-    limits = robot.limits
-    low, high = np.asarray(limits.position_lower), np.asarray(limits.position_upper)
-    bounded = np.isfinite(low) & np.isfinite(high)
-    low, high = np.where(bounded, low, 0.0), np.where(bounded, high, 0.0)
-    middle, half = 0.5 * (low + high), np.where(bounded, 0.5 * (high - low), np.inf)
-    place = np.abs(dataset["joint_position"].values - middle) / half
-    return np.maximum(place, np.abs(dataset["joint_velocity"].values) / np.asarray(limits.velocity))
+    share, _ = range_share(robot.limits, dataset["joint_position"].values)
+    rate = np.abs(dataset["joint_velocity"].values) / np.asarray(robot.limits.velocity)
+    return np.maximum(np.abs(np.asarray(share)), rate)
 
 
 def joint_panels(robot: Robot, dataset: Dataset) -> tuple[Panel, ...]:
