@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from made_replays import boxes_replay
+from scipy.spatial.transform import Rotation
 
 from jffsr.robots.geometry import BOX, CAPSULE, CYLINDER, ELLIPSOID, SPHERE, Shape
 from jffsr.viz.replay.layout import places, view_of
@@ -84,16 +85,26 @@ def test_replays_stand_beside_each_other_and_all_are_seen(count):
     right = np.cross(ahead, view.up)
     right = right / np.linalg.norm(right)
     up = np.cross(right, ahead)
+
+    def inside(points):
+        away = points - view.position
+        depth = away @ ahead
+        half = np.tan(0.5 * view.fov)
+        assert np.all(depth > 0)
+        assert np.all(np.abs(away @ up) <= half * depth)
+        assert np.all(np.abs(away @ right) <= 1.2 * half * depth)
+
     low, high = replays[0].extent()
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
     seen = []
     for shift in shifts:
+        for solid in replays[0].solids:
+            turn = Rotation.from_quat(solid.quaternion, scalar_first=True).as_matrix()
+            moved = np.einsum("fij,vj->fvi", turn, solid.vertices) + solid.position[:, None]
+            inside(moved.reshape(-1, 3) + shift)
+        for way in replays[0].ways:
+            inside(way.points + shift)
         away = corners + shift - view.position
-        depth = away @ ahead
-        assert np.all(depth > 0)
-        half = np.tan(0.5 * view.fov)
-        assert np.all(np.abs(away @ up) <= half * depth)
-        assert np.all(np.abs(away @ right) <= 1.2 * half * depth)
         # In parallel projection, that their places are not before each other.
         seen.append([(away @ right).min(), (away @ right).max(), (away @ up).min(), (away @ up).max()])
     for one in range(count):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from jffsr.viz.replay.replay import Replay
 _GAP = 0.06  # of the widest
 _FIELD = np.deg2rad(35.0)
 _SHAPE = 1.2
+_MARGIN = 1.05
+"""Room around everything, titles among it."""
 _SPACE = (0.5, -1.0, 0.55)
 _FLAT = (0.0, -0.45, 1.0)
 """To the reader: of a motion in the x-y plane from above, a little from the side, so that bodies have a shape."""
@@ -43,19 +44,15 @@ def places(replays: Sequence[Replay]) -> np.ndarray:
 def view_of(replays: Sequence[Replay]) -> View:
     """The camera that sees all of the replays in their places, in a picture 1.2 times as wide as high."""
     direction, right, up = _directions(replays)
-    points = np.concatenate(
-        [
-            np.array(list(product(*np.stack(replay.extent(), axis=1)))) + place
-            for replay, place in zip(replays, places(replays), strict=True)
-        ]
-    )
+    shifts = places(replays)
+    points = np.concatenate([replay.points + shift for replay, shift in zip(replays, shifts, strict=True)])
     across, upward = points @ right, points @ up
     middle = 0.5 * (across.min() + across.max()) * right + 0.5 * (upward.min() + upward.max()) * up
     middle = middle + np.mean(points @ direction) * direction
     seen, half = points - middle, np.tan(0.5 * _FIELD)
     # How far away each corner just comes into the picture.
     needed = np.maximum(np.abs(seen @ up), np.abs(seen @ right) / _SHAPE) / half + seen @ direction
-    return View(middle + 1.02 * needed.max() * direction, middle, np.array([0.0, 0.0, 1.0]), float(_FIELD))
+    return View(middle + _MARGIN * needed.max() * direction, middle, np.array([0.0, 0.0, 1.0]), float(_FIELD))
 
 
 def _columns(count: int, wide: float, tall: float) -> int:

@@ -6,6 +6,7 @@ All positions are in I, in m; F is the number of frames, which all arrays of a r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -109,19 +110,20 @@ class Replay:
         """How many frames there are."""
         return len(self.time)
 
-    def extent(self) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (3,), m, of the box that holds everything at all frames."""
-        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Points (k, 3), m, whose hull holds everything at all frames: corners of the solids' boxes, and all lines."""
+        found = [way.points for way in self.ways] + [arrow.origin + arrow.vector for arrow in self.arrows]
         for solid in self.solids:
             least, most = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
             corners = np.array(list(product(*zip(least, most, strict=True))))
             turned = Rotation.from_quat(solid.quaternion, scalar_first=True).as_matrix() @ corners.T
-            points = np.swapaxes(turned, -1, -2) + solid.position[:, None]
-            low, high = np.minimum(low, points.min(axis=(0, 1))), np.maximum(high, points.max(axis=(0, 1)))
-        lines = [way.points for way in self.ways] + [arrow.origin + arrow.vector for arrow in self.arrows]
-        for points in lines:
-            low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
-        return low, high
+            found.append((np.swapaxes(turned, -1, -2) + solid.position[:, None]).reshape(-1, 3))
+        return np.concatenate(found)
+
+    def extent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (3,), m, of the box that holds everything at all frames."""
+        return self.points.min(axis=0), self.points.max(axis=0)
 
     def named(self, title: str) -> Replay:
         """The same under another title."""
