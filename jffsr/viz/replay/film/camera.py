@@ -6,17 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jffsr.viz.replay.film.between import Place, turned
+from jffsr.viz.replay.film.viewpoint import best_view, moments_of, view_axes
 from jffsr.viz.replay.replay import Replay
 
 FIELD = 30.0
 """Vertical angle of view, deg."""
-_ELEVATION, _ELEVATION_FLAT = 22.0, 55.0  # deg
+_ELEVATION_FLAT = 55.0  # deg
 _SWING, _SWING_FLAT = 7.0, 3.0
 """How far the camera goes to each side of its middle, deg."""
 _SIDE, _BELOW, _ABOVE = 0.04, 0.11, 0.13
 """Free edges of a tile, as shares of its width and height; above stands the title, below what the lines are."""
-_SAMPLES, _CORNERS = 25, 40
 
 
 class Camera(NamedTuple):
@@ -39,10 +38,12 @@ class Camera(NamedTuple):
 
 def camera_for(replay: Replay, aspect: float) -> Camera:
     """The camera of a replay in a tile of this width over height."""
-    points, centres = _points(replay)
+    moments = moments_of(replay)
+    points = np.concatenate([block for moment in moments for block in moment.blocks] + _lines(replay))
+    points = points[np.isfinite(points).all(axis=1)]
     flat = is_flat(replay)
-    elevation, swing = (_ELEVATION_FLAT, _SWING_FLAT) if flat else (_ELEVATION, _SWING)
-    azimuth = 90.0 if flat else _best_azimuth(centres, elevation)
+    swing = _SWING_FLAT if flat else _SWING
+    azimuth, elevation = (90.0, _ELEVATION_FLAT) if flat else best_view(moments)
     look_at, _ = _fitted(points, azimuth, elevation, aspect)
     turns = azimuth + swing * np.linspace(-1.0, 1.0, 5)
     distance = max(_distance(points - look_at, turn, elevation, aspect) for turn in turns)
@@ -64,68 +65,10 @@ def _upright(quaternion: np.ndarray) -> np.ndarray:
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
 
 
-def _points(replay: Replay) -> tuple[np.ndarray, np.ndarray]:
-    """Points (p, 3) that hold all that is drawn at some instants, and where bodies and ends of arrows are (c, 3)."""
-    chosen = np.unique(np.linspace(0, replay.frames - 1, _SAMPLES).round().astype(int))
-    found, centres = [], [way.points for way in replay.ways]
-    for solid in replay.solids:
-        corners = _corners(solid.vertices)
-        for frame in chosen:
-            turn = _rotation(turned(solid.quaternion, Place(int(frame), 0.0)))
-            found.append(corners @ turn.T + solid.position[frame])
-        centres.append(np.array([block.mean(axis=0) for block in found[-len(chosen) :]]))
-    for arrow in replay.arrows:
-        found += [arrow.origin, arrow.origin + arrow.vector]
-    found += [way.points for way in replay.ways]
-    found += [axes.position for axes in replay.axes]
-    points = np.concatenate(found) if found else np.zeros((1, 3))
-    points = points[np.isfinite(points).all(axis=1)]
-    return points, np.concatenate(centres) if centres else points
-
-
-def _corners(vertices: np.ndarray) -> np.ndarray:
-    """Those of the vertices that are outermost in some direction: enough to know how much room a body takes."""
-    if len(vertices) <= _CORNERS:
-        return vertices
-    golden = np.pi * (1.0 + 5.0**0.5)
-    number = np.arange(_CORNERS) + 0.5
-    polar = np.arccos(1 - 2 * number / _CORNERS)
-    directions = np.stack(
-        [np.cos(golden * number) * np.sin(polar), np.sin(golden * number) * np.sin(polar), np.cos(polar)],
-        axis=1,
-    )
-    return vertices[np.unique(np.argmax(vertices @ directions.T, axis=0))]
-
-
-def _rotation(quaternion: np.ndarray) -> np.ndarray:
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def view_axes(azimuth: float, elevation: float) -> np.ndarray:
-    """Rows (3, 3): to the right and up in the picture, and from what is seen to the camera."""
-    a, e = np.deg2rad(azimuth), np.deg2rad(elevation)
-    towards = -np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), -np.sin(e)])
-    right = np.array([np.sin(a), -np.cos(a), 0.0])
-    return np.stack([right, np.cross(towards, right), towards])
-
-
-def _best_azimuth(centres: np.ndarray, elevation: float) -> float:
-    """Where bodies and ways cover most of the picture; never along an axis, where a box shows one side."""
-    spread = centres - centres.mean(axis=0)
-    choices = [quarter + turn for quarter in (0, 90, 180, 270) for turn in (30, 55)]
-
-    def area(azimuth: float) -> float:
-        seen = spread @ view_axes(azimuth, elevation)[:2].T
-        return float(np.prod(np.linalg.svd(seen, compute_uv=False)[:2]))
-
-    return float(max(choices, key=area))
+def _lines(replay: Replay) -> list[np.ndarray]:
+    """Points (p, 3) that ways, arrows and axes go to."""
+    found = [way.points for way in replay.ways] + [axes.position for axes in replay.axes]
+    return found + [end for arrow in replay.arrows for end in (arrow.origin, arrow.origin + arrow.vector)]
 
 
 def _slopes(aspect: float) -> tuple[float, float, float]:

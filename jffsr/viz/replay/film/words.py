@@ -110,25 +110,34 @@ class Words:
         self._write_keys(draw, tile, margin, known, _keys(replay))
 
     def _write_keys(
-        self, draw, tile: Tile, margin: int, known: set, keys: Sequence[tuple[str, Colour]]
+        self, draw, tile: Tile, margin: int, known: set, keys: Sequence[tuple[str, Colour, bool]]
     ) -> None:
         """What the lines are, in one row along the bottom; of several tiles, where a line first appears."""
         dash, line = 20 * self._unit, tile.top + tile.height - margin
         left, right = tile.left + margin, tile.left + tile.width - margin
-        for name, colour in keys:
+        for name, colour, pointed in keys:
             end = left + 1.4 * dash + self._small.getlength(name)
             if (name, colour) in known or end > right:
                 continue
             known.add((name, colour))
+            if pointed:
+                tip = 5 * self._unit
+                corners = (
+                    (left + dash, line),
+                    (left + dash - 2 * tip, line - tip),
+                    (left + dash - 2 * tip, line + tip),
+                )
+                draw.polygon(corners, fill=(*_ink(colour), 255))
             half = 1.5 * self._unit
             draw.rectangle((left, line - half, left + dash, line + half), fill=(*_ink(colour), 255))
             draw.text((left + 1.4 * dash, line), name, (*_QUIET, 255), self._small, "lm")
             left = end + 1.2 * dash
 
 
-def _keys(replay: Replay) -> list[tuple[str, Colour]]:
-    lines = [(way.name, paled(way.colour) if way.ahead else way.colour) for way in replay.ways]
-    return list(dict.fromkeys(lines + [(arrow.name, arrow.colour) for arrow in replay.arrows]))
+def _keys(replay: Replay) -> list[tuple[str, Colour, bool]]:
+    """Names and colours of all lines, and whether they are arrows."""
+    ways = [(way.name, paled(way.colour) if way.ahead else way.colour, False) for way in replay.ways]
+    return list(dict.fromkeys(ways + [(arrow.name, arrow.colour, True) for arrow in replay.arrows]))
 
 
 def _ink(colour: Colour) -> tuple[int, int, int]:
