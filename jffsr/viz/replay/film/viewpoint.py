@@ -20,7 +20,7 @@ _AZIMUTHS = [quarter + turn for quarter in (0.0, 90.0, 180.0, 270.0) for turn in
 
 
 class Moment(NamedTuple):
-    """One instant: points of every body (c, 3) in I, and for all bodies their positions and rotations to I."""
+    """One instant: points (c, 3) in I of every body, then of every way, and the bodies' positions and rotations to I."""
 
     blocks: tuple[np.ndarray, ...]
     positions: np.ndarray
@@ -33,13 +33,16 @@ def moments_of(replay: Replay) -> list[Moment]:
     """Some instants of a replay, its first and last among them."""
     corners = [_corners(solid.vertices) for solid in replay.solids]
     boxes = np.array([(c.min(axis=0), c.max(axis=0)) if len(c) else np.zeros((2, 3)) for c in corners])
+    ways = [
+        way.points[np.isfinite(way.points).all(axis=1)][:: max(replay.frames // 20, 1)] for way in replay.ways
+    ]
     found = []
     for frame in np.unique(np.linspace(0, replay.frames - 1, _SAMPLES).round().astype(int)):
         place = Place(int(frame), 0.0)
         rotations = np.array([_rotation(turned(solid.quaternion, place)) for solid in replay.solids])
         positions = np.array([solid.position[frame] for solid in replay.solids])
-        blocks = tuple(c @ r.T + p for c, r, p in zip(corners, rotations, positions, strict=True))
-        found.append(Moment(blocks, positions, rotations, boxes))
+        blocks = [c @ r.T + p for c, r, p in zip(corners, rotations, positions, strict=True)]
+        found.append(Moment((*blocks, *ways), positions, rotations, boxes))
     return found
 
 
@@ -66,7 +69,7 @@ def best_view(moments: Sequence[Moment]) -> tuple[float, float]:
 
 
 def _seen(moment: Moment, towards: np.ndarray) -> float:
-    """The mean over all bodies of the share of their points that no box of a large body hides from `towards`."""
+    """The mean over all bodies and ways of the share of their points that no box of a large body hides from `towards`."""
     order = np.argsort(-np.prod(moment.boxes[:, 1] - moment.boxes[:, 0], axis=1))[:_HIDING]
     shares = []
     for number, block in enumerate(moment.blocks):
