@@ -121,7 +121,9 @@ def _add_watch(commands: argparse._SubParsersAction) -> None:
         description="Show in a browser how a run or sweep gets on, from its folder alone, until Ctrl-C.",
     )
     watch.add_argument("run", metavar="RUN_DIR", help="the folder of a run or sweep, under way or finished")
-    watch.add_argument("--port", type=int, metavar="N", help="where the page is served (default: from 8080 on)")
+    watch.add_argument(
+        "--port", type=int, metavar="N", help="where the page is served (default: from 8080 on)"
+    )
     watch.add_argument("--no-browser", action="store_true", help="print where the page is, and open nothing")
     watch.set_defaults(command="watch")
 

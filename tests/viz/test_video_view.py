@@ -8,12 +8,13 @@ from replay_of_boxes import box, sliding, two_boxes
 from scipy.spatial.transform import Rotation
 
 from jffsr.errors import InputError
-from jffsr.viz.replay.film.camera import FIELD, camera_for, is_flat
+from jffsr.viz.replay.film.camera import FIELD, camera_for, cameras_for, is_flat
 from jffsr.viz.replay.film.drawing import Task
 from jffsr.viz.replay.film.facets import corner_normals
 from jffsr.viz.replay.film.offscreen import drawn
 from jffsr.viz.replay.film.tiles import strip_height, tiles
 from jffsr.viz.replay.film.timing import film_timing
+from jffsr.viz.replay.film.viewpoint import view_axes
 from jffsr.viz.replay.film.words import Words
 from jffsr.viz.replay.replay import Replay, Solid
 from jffsr.viz.replay.video import save_video
@@ -30,7 +31,7 @@ def tumbling(frames: int = 9) -> Replay:
 @pytest.mark.parametrize("replay", [two_boxes(), tumbling()])
 @pytest.mark.parametrize("aspect", [0.6, 1.0, 2.0])
 def test_everything_is_in_the_picture_and_fills_it(replay, aspect):
-    camera = camera_for(replay, aspect)
+    camera = camera_for([replay], aspect)
     half = np.tan(np.deg2rad(FIELD / 2))
     reached = []
     for share in (0.0, 0.25, 0.5, 1.0):
@@ -51,7 +52,26 @@ def test_everything_is_in_the_picture_and_fills_it(replay, aspect):
 def test_a_motion_in_the_plane_is_seen_from_above():
     assert is_flat(two_boxes())
     assert not is_flat(tumbling())
-    assert camera_for(two_boxes(), 1.5).elevation > 45.0 > camera_for(tumbling(), 1.5).elevation
+    assert camera_for([two_boxes()], 1.5).elevation > 45.0 > camera_for([tumbling()], 1.5).elevation
+
+
+def test_replays_of_the_same_bodies_are_seen_alike():
+    near, other, again = two_boxes("a"), tumbling(), two_boxes("b", span=9.0)
+    cameras = cameras_for([near, other, again], 1.0)
+    assert cameras[0] is cameras[2]
+    assert cameras[1].elevation != cameras[0].elevation
+
+
+def test_a_small_body_is_seen_in_front_of_the_large_one_that_would_hide_it():
+    for side in ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]):
+        small = 1.4 * np.array(side)
+        solids = (
+            sliding("large", (0.5, 0.5, 0.5), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 3, side=2.0),
+            sliding("small", (0.5, 0.5, 0.5), small, small + np.array([0.0, 0.0, 0.4]), 3, side=0.2),
+        )
+        camera = camera_for([Replay("hidden", np.arange(3.0), solids)], 1.5)
+        # The camera stands on the small body's side of the large one.
+        assert view_axes(camera.azimuth, camera.elevation)[2] @ side > 0.3
 
 
 @pytest.mark.parametrize("count", range(1, 13))

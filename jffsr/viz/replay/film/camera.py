@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from jffsr.viz.replay.replay import Replay
 
 FIELD = 30.0
 """Vertical angle of view, deg."""
-_ELEVATION_FLAT = 55.0  # deg
+_ELEVATION_FLAT = 60.0  # deg
 _SWING, _SWING_FLAT = 7.0, 3.0
 """How far the camera goes to each side of its middle, deg."""
 _SIDE, _BELOW, _ABOVE = 0.04, 0.11, 0.13
@@ -36,12 +37,26 @@ class Camera(NamedTuple):
         return 2.0 * self.distance * np.tan(np.deg2rad(0.5 * FIELD)) / height
 
 
-def camera_for(replay: Replay, aspect: float) -> Camera:
-    """The camera of a replay in a tile of this width over height."""
-    moments = moments_of(replay)
-    points = np.concatenate([block for moment in moments for block in moment.blocks] + _lines(replay))
+def cameras_for(replays: Sequence[Replay], aspect: float) -> list[Camera]:
+    """The camera of each replay in a tile of this width over height; replays of the same bodies are seen alike."""
+    alike: dict[tuple[str, ...], list[Replay]] = {}
+    for replay in replays:
+        alike.setdefault(_bodies(replay), []).append(replay)
+    cameras = {bodies: camera_for(group, aspect) for bodies, group in alike.items()}
+    return [cameras[_bodies(replay)] for replay in replays]
+
+
+def _bodies(replay: Replay) -> tuple[str, ...]:
+    return tuple(solid.name for solid in replay.solids)
+
+
+def camera_for(replays: Sequence[Replay], aspect: float) -> Camera:
+    """One camera that sees all of each of these replays."""
+    moments = [moment for replay in replays for moment in moments_of(replay)]
+    blocks = [block for moment in moments for block in moment.blocks]
+    points = np.concatenate(blocks + [line for replay in replays for line in _lines(replay)])
     points = points[np.isfinite(points).all(axis=1)]
-    flat = is_flat(replay)
+    flat = all(is_flat(replay) for replay in replays)
     swing = _SWING_FLAT if flat else _SWING
     azimuth, elevation = (90.0, _ELEVATION_FLAT) if flat else best_view(moments)
     look_at, _ = _fitted(points, azimuth, elevation, aspect)
@@ -67,7 +82,10 @@ def _upright(quaternion: np.ndarray) -> np.ndarray:
 
 def _lines(replay: Replay) -> list[np.ndarray]:
     """Points (p, 3) that ways, arrows and axes go to."""
-    found = [way.points for way in replay.ways] + [axes.position for axes in replay.axes]
+    found = [way.points for way in replay.ways]
+    found += [
+        axes.position + axes.length * side for axes in replay.axes for side in (-np.ones(3), np.ones(3))
+    ]
     return found + [end for arrow in replay.arrows for end in (arrow.origin, arrow.origin + arrow.vector)]
 
 

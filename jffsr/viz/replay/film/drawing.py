@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jffsr.viz.replay.film.between import mixed, near, place_at, turned
-from jffsr.viz.replay.film.camera import camera_for
+from jffsr.viz.replay.film.camera import Camera, cameras_for
 from jffsr.viz.replay.film.sky import BELOW
 from jffsr.viz.replay.film.tiles import Tile
 from jffsr.viz.replay.replay import Replay
@@ -39,14 +39,13 @@ class Task(NamedTuple):
 class _Stage:
     """One replay, ready to be drawn into its tile."""
 
-    def __init__(self, replay: Replay, tile: Tile, height: int):
+    def __init__(self, replay: Replay, camera: Camera, tile: Tile, height: int):
         import mujoco
 
         from jffsr.viz.replay.film.model import film_model
         from jffsr.viz.replay.film.strokes import Strokes, most_strokes
 
-        self._replay = replay
-        self._camera = camera_for(replay, tile.width / tile.height)
+        self._replay, self._camera = replay, camera
         self._model = film_model(replay, self._camera, tile.width, tile.height)
         self._data = mujoco.MjData(self._model)
         # In a small tile lines are thinner, but not in proportion.
@@ -91,8 +90,11 @@ class _Stage:
 
 def pictures(task: Task) -> Iterator[np.ndarray]:
     """The pictures (height, width, 3) one after another; the current thread needs an OpenGL context."""
-    pairs = zip(task.replays, task.tiles, strict=True)
-    stages = [_Stage(replay, tile, task.height) for replay, tile in pairs]
+    cameras = cameras_for(task.replays, task.tiles[0].width / task.tiles[0].height)
+    stages = [
+        _Stage(replay, camera, tile, task.height)
+        for replay, camera, tile in zip(task.replays, cameras, task.tiles, strict=True)
+    ]
     whole = np.empty((task.height, task.width, 3), np.uint8)
     whole[:] = BELOW.astype(np.uint8)
     for number, instant in enumerate(task.times):

@@ -20,7 +20,7 @@ _AZIMUTHS = [quarter + turn for quarter in (0.0, 90.0, 180.0, 270.0) for turn in
 
 
 class Moment(NamedTuple):
-    """One instant: points (c, 3) in I of every body, then of every way, and the bodies' positions and rotations to I."""
+    """One instant: points (c, 3) in I of every body, then of every way, and how each body is placed and turned in I."""
 
     blocks: tuple[np.ndarray, ...]
     positions: np.ndarray
@@ -69,7 +69,7 @@ def best_view(moments: Sequence[Moment]) -> tuple[float, float]:
 
 
 def _seen(moment: Moment, towards: np.ndarray) -> float:
-    """The mean over all bodies and ways of the share of their points that no box of a large body hides from `towards`."""
+    """The share of points that no large body's box hides from `towards`, its mean over all bodies and ways."""
     order = np.argsort(-np.prod(moment.boxes[:, 1] - moment.boxes[:, 0], axis=1))[:_HIDING]
     shares = []
     for number, block in enumerate(moment.blocks):
