@@ -16,7 +16,7 @@ from jffsr.study.sweep.parts import save_part
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.tasks import Task
 from jffsr.viz.live.growing import GrowingLines
-from jffsr.viz.live.news import Chart, News, Table, ago, lasting
+from jffsr.viz.live.news import Chart, News, Table, ago, curve, lasting
 from jffsr.viz.live.page import table, words
 from jffsr.viz.live.watching import watch_of
 
@@ -238,6 +238,14 @@ def test_what_is_neither_run_nor_sweep_is_refused(tmp_path, capsys):
         told = capsys.readouterr().err
         assert word in told
         assert told.count("\n") == 1
+
+
+def test_a_long_curve_is_thinned_to_its_ends():
+    x = np.arange(50_000.0)
+    found = curve("J", "x", "J", x, -x)
+    assert len(found.x) == 600
+    assert (found.x[0], found.x[-1], found.curves["J"][-1]) == (0.0, 49_999.0, -49_999.0)
+    assert curve("J", "x", "J", [1.0], [np.nan]) is None
 
 
 def test_lengths_of_time_are_told_in_two_units():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -12,15 +13,21 @@ import time
 import urllib.error
 import urllib.request
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from replay_of_boxes import two_boxes
 
 import jffsr
+from jffsr import cli
+from jffsr.errors import InputError
+from jffsr.study import planning
 from jffsr.study.config import dump_config, load_config
 from jffsr.viz.live.news import Chart, News
 from jffsr.viz.live.page import LivePage
-from jffsr.viz.live.watching import serve_live, watch_of
+from jffsr.viz.live.watching import refresh, serve_live, watch_of
+from jffsr.viz.replay.reading import replays_of
 
 PATIENCE = 120.0  # s, far more than anything here takes
 
@@ -111,6 +118,72 @@ def answer(url: str) -> int:
         except urllib.error.URLError:
             time.sleep(0.1)
     return 0
+
+
+def test_the_button_is_there_only_with_a_motion_and_its_refusal_is_told(page):
+    def refuse():
+        raise InputError("the search has found no motion yet")
+
+    watch = SimpleNamespace(news=news, has_motion=False, motion=refuse)
+    refresh(page, watch)
+    assert not page._button.visible
+    watch.has_motion = True
+    refresh(page, watch)
+    assert page._button.visible
+    assert page._told.content == ""
+    page._ask(None)
+    refresh(page, watch)
+    assert "no motion yet" in page._told.content
+    assert not page.plays
+    assert not page.asked
+
+
+def test_a_motion_is_played_again_and_again(page):
+    watch = SimpleNamespace(news=news, has_motion=True, motion=lambda: two_boxes("best so far", span=2.0))
+    page.play(1.0)
+    for _ in range(2):
+        page._ask(None)
+        refresh(page, watch)
+        assert page.plays
+        assert page._told.content == "*best so far*"
+    # Frames are at 0, 0.5, 1, 1.5 and 2 s.
+    shown = []
+    for _ in range(6):
+        page.play(0.5)
+        shown.append(page._motion._scene._shown[0])
+    assert shown == [1, 2, 3, 4, 0, 1]
+
+
+@pytest.mark.slow
+def test_the_best_motion_so_far_is_that_of_the_checkpoint(tmp_path, monkeypatch):
+    """At the end of a search the checkpoint's motion is the one that is then written as the run's result."""
+    config, folder, kept = tmp_path / "planar.yaml", tmp_path / "run", tmp_path / "kept"
+    config.write_text(PLANAR.replace("4000", "40"), encoding="utf-8")
+    finish = planning._finish
+
+    def keep(folder, *rest):
+        kept.mkdir()
+        for path in (folder.config, folder.checkpoint):
+            shutil.copy(path, kept)
+        finish(folder, *rest)
+
+    monkeypatch.setattr(planning, "_finish", keep)
+    cli.main(["run", str(config), "--out", str(folder)])
+    assert watch_of(kept).has_motion
+    assert not watch_of(folder).has_motion
+    found, result = watch_of(kept).motion(), replays_of(folder)[0]
+    assert "best after 40 evaluations" in found.title
+    np.testing.assert_allclose(found.time, result.time, atol=1e-12)
+    for one, other in zip(found.solids, result.solids, strict=True):
+        assert one.name == other.name
+        np.testing.assert_allclose(one.position, other.position, atol=1e-9)
+        np.testing.assert_allclose(one.quaternion, other.quaternion, atol=1e-9)
+    (kept / "checkpoint.npz").write_bytes(b"damaged")
+    with pytest.raises(InputError, match="checkpoint cannot be read"):
+        watch_of(kept).motion()
+    (kept / "checkpoint.npz").unlink()
+    with pytest.raises(InputError, match="no checkpoint, and so no motion, yet"):
+        watch_of(kept).motion()
 
 
 @pytest.mark.slow

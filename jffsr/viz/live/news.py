@@ -12,6 +12,8 @@ from jffsr.errors import InputError
 from jffsr.study.run_folder import RunFolder
 from jffsr.study.sweep.folder import SweepFolder
 
+_PLACES = 600
+
 
 @dataclass(frozen=True)
 class Chart:
@@ -55,10 +57,14 @@ class News:
 
 
 def curve(title: str, x_label: str, name: str, x, y) -> Chart | None:
-    """A chart of one curve from where it is finite on; None where it nowhere is."""
+    """A chart of one curve where it is finite, at no more than 600 places; None where it nowhere is."""
     x, y = np.asarray(x, float), np.asarray(y, float)
-    kept = np.isfinite(x) & np.isfinite(y)
-    return Chart(title, x_label, x[kept], {name: y[kept]}) if kept.any() else None
+    kept = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if not kept.size:
+        return None
+    if kept.size > _PLACES:
+        kept = kept[np.linspace(0, kept.size - 1, _PLACES).round().astype(int)]
+    return Chart(title, x_label, x[kept], {name: y[kept]})
 
 
 def ending(folder: RunFolder | SweepFolder) -> str:

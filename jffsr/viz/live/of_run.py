@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jffsr.study.run_folder import RunFolder
 from jffsr.viz.live.growing import GrowingLines
 from jffsr.viz.live.news import Chart, News, Table, ago, changed_at, curve, ending
+
+if TYPE_CHECKING:
+    from jffsr.viz.replay.replay import Replay
 
 _ROWS = 12
 
@@ -38,6 +41,17 @@ class RunWatch:
             table = _table(rows)
         hint = f"jffsr show {folder.path}" if folder.finished else ""
         return News(self._headline(bool(rows)), folder.finished, tuple(facts), charts, table, hint=hint)
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether there may be a motion to look at before the run is finished."""
+        return self.kind == "planning" and self._folder.checkpoint.is_file()
+
+    def motion(self) -> Replay:
+        """The best motion so far; InputError where there is none."""
+        from jffsr.viz.live.best_motion import best_replay
+
+        return best_replay(self._folder.path)
 
     def _headline(self, begun: bool) -> str:
         folder = self._folder

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from jffsr.errors import InputError
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.folder import SweepFolder
 from jffsr.study.sweep.parts import read_part
 from jffsr.study.sweep.points import expand, value_text
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.viz.live.news import Chart, News, Table, ago, changed_at, curve, ending
+
+if TYPE_CHECKING:
+    from jffsr.viz.replay.replay import Replay
 
 _ROWS = 20
 
@@ -29,6 +33,7 @@ class SweepWatch:
     """Looks into a sweep's folder; InputError where it is none. It reads and writes nothing else."""
 
     kind = "sweep"
+    has_motion = False
 
     def __init__(self, path: Path):
         self._folder = SweepFolder(path)
@@ -70,6 +75,10 @@ class SweepWatch:
             done / self._count,
             hint=f"jffsr show {folder.path}" if folder.finished else "",
         )
+
+    def motion(self) -> Replay:
+        """None is kept before the sweep is finished."""
+        raise InputError(f"{self._folder.path}: a sweep keeps no motion while it is under way")
 
     def _look(self) -> None:
         """Read the parts that are new; one that cannot be read is another look's."""
@@ -113,15 +122,11 @@ class SweepWatch:
         start = instants[0] if begun is None else min(begun, instants[0])
         count = np.arange(len(ordered) + 1.0)
         unit, size = _unit(instants[-1] - start)
-        finished = Chart(
-            "finished points",
-            f"{unit} since the sweep began",
-            np.concatenate([[0.0], (instants - start) / size]),
-            {"finished": count},
-        )
+        since = np.concatenate([[0.0], (instants - start) / size])
+        finished = curve("finished points", f"{unit} since the sweep began", "finished", since, count)
         best = np.minimum.accumulate([found.cost for found in ordered])
         found = curve("best J so far", "finished points", "best J", count[1:], best)
-        return (finished, found) if found is not None else (finished,)
+        return tuple(chart for chart in (finished, found) if chart is not None)
 
     def _table(self) -> Table:
         rows = []

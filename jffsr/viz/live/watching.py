@@ -6,14 +6,17 @@ import time
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from jffsr.errors import InputError
 from jffsr.study.sweep.specification import is_sweep
 from jffsr.viz.live.news import News
 from jffsr.viz.live.page import LivePage
 
-_EVERY = 1.0  # s
+if TYPE_CHECKING:
+    from jffsr.viz.replay.replay import Replay
+
+_EVERY, _PICTURE = 1.0, 1.0 / 30.0  # s
 
 
 class Watch(Protocol):
@@ -21,9 +24,13 @@ class Watch(Protocol):
 
     name: str
     kind: str
+    has_motion: bool
 
     def news(self) -> News:
         """How it stands now."""
+
+    def motion(self) -> Replay:
+        """The best motion so far; InputError where there is none."""
 
 
 def watch_of(path: str | Path) -> Watch:
@@ -59,14 +66,34 @@ def serve_live(
     watch = watch_of(path)
     page = LivePage(f"{watch.kind} {watch.name}" if watch.kind == "sweep" else f"run {watch.name}", port)
     try:
-        page.show(watch.news())
+        refresh(page, watch)
         print(f"  watching      {page.url} (Ctrl-C ends it)", flush=True)
         if open_browser:
             webbrowser.open(page.url)
+        looked = before = time.monotonic()
         while not stop():
-            time.sleep(_EVERY)
-            page.show(watch.news())
+            time.sleep(_PICTURE if page.plays else _EVERY)
+            now = time.monotonic()
+            page.play(now - before)
+            before = now
+            if now - looked >= _EVERY:
+                looked = now
+                refresh(page, watch)
     except KeyboardInterrupt:
         print()
     finally:
         page.close()
+
+
+def refresh(page: LivePage, watch: Watch) -> None:
+    """Look once, and draw the motion if somebody asked for it."""
+    page.show(watch.news())
+    page.offer(watch.has_motion)
+    if not page.asked:
+        return
+    page.asked = False
+    page.tell("drawing the best motion; the first takes some seconds")
+    try:
+        page.draw_motion(watch.motion())
+    except InputError as error:
+        page.tell(str(error))
