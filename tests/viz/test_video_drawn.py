@@ -90,9 +90,11 @@ def test_a_body_at_its_limit_is_red(passing):
 
 def test_a_way_grows_and_one_ahead_is_there_from_the_start(passing):
     seen = inside(passing)[:21]
-    magenta = (np.minimum(seen[..., 0], seen[..., 2]) - seen[..., 1] > 60).sum(axis=(1, 2))
-    assert magenta[0] < 10
-    assert (np.diff(magenta[::4]) > 15).all()
+    magenta = np.minimum(seen[..., 0], seen[..., 2]) - seen[..., 1] > 45
+    assert magenta[0].sum() < 10
+    ends = [np.flatnonzero(picture.any(axis=0))[[0, -1]] for picture in magenta[4::4]]
+    assert (np.diff([end for _, end in ends]) > 30).all()
+    assert np.ptp([start for start, _ in ends]) < 20
     cyan = np.minimum(seen[..., 1], seen[..., 2]) - seen[..., 0] > 40
     wide = [np.ptp(np.flatnonzero(picture.any(axis=0))) for picture in cyan[[0, 10, 20]]]
     assert min(wide) > 0.95 * max(wide) > 200

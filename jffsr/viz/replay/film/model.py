@@ -10,7 +10,8 @@ from jffsr.viz.replay.film.facets import corner_normals
 from jffsr.viz.replay.film.sky import sky
 from jffsr.viz.replay.replay import Replay
 
-_SHADOWS = 2048  # pixels
+_SHADOWS = (512, 2048)
+"""Sides of the shadows' map at least and at most, pixels: three for each of the tile's height, in powers of two."""
 _SMOOTHING = 4  # samples of a pixel
 _SUN = np.array([-0.55, 0.75, 0.85])
 """Where the light comes from: to the right, up, to the camera."""
@@ -23,7 +24,7 @@ def film_model(replay: Replay, camera: Camera, width: int, height: int) -> mujoc
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     spec.visual.global_.fovy = FIELD
     spec.visual.quality.offsamples = _SMOOTHING
-    spec.visual.quality.shadowsize = _SHADOWS
+    spec.visual.quality.shadowsize = int(np.clip(2 ** round(np.log2(3 * height)), *_SHADOWS))
     # Only ways, arrows and axes are made of these.
     spec.visual.quality.numslices, spec.visual.quality.numstacks = 14, 8
     # All lengths below are measured in the extent.
