@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-browser check-native check-distributed check-sweep check-cluster bench bench-optimizers bench-tracking compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-browser check-native check-distributed check-sweep check-cluster check-video bench bench-optimizers bench-tracking compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -101,6 +101,19 @@ check-cluster: $(STAMP)  ## check that a sweep on a dask cluster survives the lo
 	@$(if $(UV),"$(UV)" pip install --quiet --python "$(VENV_PYTHON)",\
 	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check) -e '.[cluster]' -c constraints.txt
 	$(VENV_PYTHON) -m pytest -m cluster $(PYTEST_ARGS)
+
+# OpenGL belongs to the system; newer systems have no OSMesa, and EGL alone will do.
+OPENGL := libegl1 libgl1 libopengl0 libgl1-mesa-dri
+check-video: $(STAMP)  ## draw, encode and decode videos (gets OpenGL by apt-get where it is missing)
+	@has() { "$(VENV_PYTHON)" -c "import sys, ctypes.util as u; sys.exit(u.find_library('$$1') is None)"; }; \
+	if ! { has EGL && has OpenGL; }; then \
+	    command -v apt-get >/dev/null || { echo "make check-video needs libEGL and libOpenGL, and there is no apt-get here: install them." >&2; exit 1; }; \
+	    as_root=$$([ "$$(id -u)" = 0 ] || echo sudo); \
+	    $$as_root apt-get update -q && $$as_root apt-get install -q -y --no-install-recommends $(OPENGL) \
+	        || { echo "make check-video could not install $(OPENGL): install them, then repeat it." >&2; exit 1; }; \
+	    $$as_root apt-get install -q -y --no-install-recommends libosmesa6 || true; \
+	fi
+	$(VENV_PYTHON) -m pytest -m video $(PYTEST_ARGS)
 
 lint: $(STAMP)  ## check style and format
 	$(VENV_PYTHON) -m ruff check .

@@ -59,6 +59,13 @@ def _defect() -> int:
     return DEFECT
 
 
+def _watch(arguments: argparse.Namespace) -> int:
+    from jffsr.viz.live.watching import serve_live
+
+    serve_live(arguments.run, arguments.port, open_browser=not arguments.no_browser)
+    return MET
+
+
 def _map(arguments: argparse.Namespace) -> int:
     _prepare_jax()
     _use_all_devices(arguments)
@@ -253,6 +260,7 @@ _COMMANDS = {
     "show": _show,
     "sweep": _sweep,
     "map": _map,
+    "watch": _watch,
 }
 
 if __name__ == "__main__":

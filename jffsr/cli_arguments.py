@@ -71,6 +71,7 @@ def parser() -> argparse.ArgumentParser:
     check.set_defaults(command="check")
 
     _add_show(commands)
+    _add_watch(commands)
     _add_map(commands)
 
     robots = commands.add_parser(
@@ -111,6 +112,20 @@ def _add_show(commands: argparse._SubParsersAction) -> None:
     )
     show.add_argument("--no-browser", action="store_true", help="print where the replay is, and open nothing")
     show.set_defaults(command="show")
+
+
+def _add_watch(commands: argparse._SubParsersAction) -> None:
+    watch = commands.add_parser(
+        "watch",
+        help="see in a browser how a run or sweep gets on",
+        description="Show in a browser how a run or sweep gets on, from its folder alone, until Ctrl-C.",
+    )
+    watch.add_argument("run", metavar="RUN_DIR", help="the folder of a run or sweep, under way or finished")
+    watch.add_argument(
+        "--port", type=int, metavar="N", help="where the page is served (default: from 8080 on)"
+    )
+    watch.add_argument("--no-browser", action="store_true", help="print where the page is, and open nothing")
+    watch.set_defaults(command="watch")
 
 
 def _add_sweep(commands: argparse._SubParsersAction) -> None:

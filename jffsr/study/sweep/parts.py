@@ -56,7 +56,7 @@ def load_parts(folder: Path, tasks: Sequence[Task]) -> list[Part]:
     parts = []
     for path in sorted(folder.glob(f"*{_ENDING}")):
         try:
-            part, found = _read(path)
+            part, found = read_part(path)
         except Exception:
             path.replace(path.with_suffix(".damaged"))
             continue
@@ -69,7 +69,8 @@ def load_parts(folder: Path, tasks: Sequence[Task]) -> list[Part]:
     return parts
 
 
-def _read(path: Path) -> tuple[Part, list[str]]:
+def read_part(path: Path) -> tuple[Part, list[str]]:
+    """A part's file, and the marks of its points; raises whatever NumPy does where it is damaged."""
     with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
         head = json.loads(file["head"].tobytes())
         results = {name: file[name] for name in file.files if name != "head"}
