@@ -12,8 +12,8 @@ from jffsr.viz.replay.replay import Replay
 _GAP = 0.06  # of the widest
 _FIELD = np.deg2rad(35.0)
 _SHAPE = 1.2
-_MARGIN = 1.05
-"""Room around everything, titles among it."""
+_MARGIN, _OVER = 1.05, 0.03
+"""Room around everything; how far over a replay its title stands, as a share of its size."""
 _SPACE = (0.5, -1.0, 0.55)
 _FLAT = (0.0, -0.45, 1.0)
 """To the reader: of a motion in the x-y plane from above, a little from the side, so that bodies have a shape."""
@@ -45,7 +45,10 @@ def view_of(replays: Sequence[Replay]) -> View:
     """The camera that sees all of the replays in their places, in a picture 1.2 times as wide as high."""
     direction, right, up = _directions(replays)
     shifts = places(replays)
-    points = np.concatenate([replay.points + shift for replay, shift in zip(replays, shifts, strict=True)])
+    points = [replay.points + shift for replay, shift in zip(replays, shifts, strict=True)]
+    if len(replays) > 1:
+        points += [title_place(replay)[None] + shift for replay, shift in zip(replays, shifts, strict=True)]
+    points = np.concatenate(points)
     across, upward = points @ right, points @ up
     middle = 0.5 * (across.min() + across.max()) * right + 0.5 * (upward.min() + upward.max()) * up
     middle = middle + np.mean(points @ direction) * direction
@@ -53,6 +56,12 @@ def view_of(replays: Sequence[Replay]) -> View:
     # How far away each corner just comes into the picture.
     needed = np.maximum(np.abs(seen @ up), np.abs(seen @ right) / _SHAPE) / half + seen @ direction
     return View(middle + _MARGIN * needed.max() * direction, middle, np.array([0.0, 0.0, 1.0]), float(_FIELD))
+
+
+def title_place(replay: Replay) -> np.ndarray:
+    """Where the title of one replay of several stands, (3,): over its middle."""
+    low, high = replay.extent()
+    return np.array([*(0.5 * (low + high))[:2], high[2] + _OVER * (high - low).max()])
 
 
 def _columns(count: int, wide: float, tall: float) -> int:

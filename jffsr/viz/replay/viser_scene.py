@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jffsr.viz.replay.layout import places, view_of
+from jffsr.viz.replay.layout import places, title_place, view_of
 from jffsr.viz.replay.replay import Axes, Colour, Replay, Solid, Way
 from jffsr.viz.replay.shading import warned
 
@@ -41,9 +41,7 @@ class ReplayScene:
             scene.add_frame(root, show_axes=False, position=place)
             self._parts.append(_Parts(scene, root, replay, sizes[number]))
             if len(self.replays) > 1:
-                low, high = replay.extent()
-                over = np.array([*(0.5 * (low + high))[:2], high[2] + 0.03 * sizes[number]])
-                scene.add_label(f"{root}/title", replay.title, position=over)
+                scene.add_label(f"{root}/title", replay.title, position=title_place(replay))
         view = view_of(self.replays)
         camera = server.initial_camera
         camera.position, camera.look_at, camera.up, camera.fov = (
