@@ -11,7 +11,7 @@ jax.config.update("jax_enable_x64", True)
 
 
 def base_turn(design: jnp.ndarray) -> jnp.ndarray:
-    """Angle, rad, about z that the base is turned by at the end; design: factors of base mass and of link 2's length."""
+    """Angle, rad, that the base has turned by at the end; design: factors of base mass and of link 2's length."""
     robot = jffsr.load_robot("hu_2011_planar2")
     longer = jffsr.Design(length=jnp.array([1.0, design[1]]), mount=jnp.zeros((1, 3)))
     robot = jffsr.redesigned(robot, longer, mass_exponent=1.0)  # a longer link is heavier, too

@@ -14,7 +14,9 @@ jax.config.update("jax_enable_x64", True)
 
 def travel(robot, motion):
     """Largest way of a joint, rad: the function that YAML names as `call: own_objective.travel`."""
-    steps = jnp.sqrt(jnp.diff(motion.joint_position, axis=0) ** 2 + 1e-12)  # no corner where a joint turns back
+    steps = jnp.sqrt(
+        jnp.diff(motion.joint_position, axis=0) ** 2 + 1e-12
+    )  # no corner where a joint turns back
     return jnp.max(jnp.sum(steps, axis=0))
 
 

@@ -1,4 +1,4 @@
-"""The tool goes round a circle while the base floats: rates held between samples drift off it, feedback brings them back."""
+"""The tool goes round a circle while the base floats: held rates drift off it, feedback brings them back."""
 
 import sys
 
