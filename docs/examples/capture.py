@@ -12,7 +12,8 @@ jax.config.update("jax_enable_x64", True)
 
 
 def main(small: bool = False) -> jffsr.CapturePlan:
-    robot = jffsr.load_robot("ye_planar3")
+    bus = jffsr.RigidBody.create(mass=1000.0, inertia=[300.0, 300.0, 300.0], name="bus")
+    robot = jffsr.attach(bus, jffsr.load_robot("ye_planar3"), arm_base="drop")
     limits = jffsr.Limits.symmetric(position=np.deg2rad(140), velocity=0.15, acceleration=0.05, num_joints=3)
     robot = robot.replace(limits=limits)
     upright = np.array([1.0, 0, 0, 0])
@@ -21,7 +22,7 @@ def main(small: bool = False) -> jffsr.CapturePlan:
     seen = jffsr.TargetState.create((3.4, 0.7, 0.0), (-0.005, 0.005, 0.0), upright, (0.0, 0.0, 0.02))
     motion = jffsr.target_motion(box, seen, duration=41.0)
     path = jffsr.GraspPath.create(motion, "handle")
-    settings = jffsr.CaptureSettings(CandidateSettings(window=(15.0, 40.0)), num_steps=40)
+    settings = jffsr.CaptureSettings(CandidateSettings(window=(15.0, 40.0), times=2), num_steps=40)
     plan = jffsr.plan_capture(robot, path, start, None, settings, improve=1 if small else 3)
     print(plan.result.sentence)
     if not plan.result.success:
