@@ -22,7 +22,7 @@ def main(small: bool = False) -> jffsr.CapturePlan:
     seen = jffsr.TargetState.create((3.4, 0.7, 0.0), (-0.005, 0.005, 0.0), upright, (0.0, 0.0, 0.02))
     motion = jffsr.target_motion(box, seen, duration=41.0)
     path = jffsr.GraspPath.create(motion, "handle")
-    settings = jffsr.CaptureSettings(CandidateSettings(window=(15.0, 40.0), times=2), num_steps=40)
+    settings = jffsr.CaptureSettings(CandidateSettings(window=(15.0, 40.0), times=2), num_steps=40, lanes=8)
     plan = jffsr.plan_capture(robot, path, start, None, settings, improve=1 if small else 3)
     print(plan.result.sentence)
     if not plan.result.success:

@@ -17,8 +17,8 @@ def main(small: bool = False) -> np.ndarray:
     limits = jffsr.Limits.symmetric(position=np.deg2rad(324), velocity=0.4, acceleration=0.2, num_joints=2)
     robot = robot.replace(limits=limits)
     start, goal = np.deg2rad([[90.0, 30.0], [-60.0, 90.0]])
-    index = jffsr.composite_index(robot, joint_goal=goal)
-    durations = [12.0, 16.0, 20.0]
+    index = jffsr.composite_index(robot, joint_goal=goal, attitude_change=np.deg2rad(1.0))
+    durations = [10.0, 15.0, 30.0]
     seeds = range(2 if small else 20)
     problems, draws = [], []
     for duration in durations:
