@@ -12,7 +12,7 @@ import yaml
 from documentation import NAMES, ROOT, Block, blocks_of, commands, inline_code
 
 import jffsr
-from jffsr.cli import _parser
+from jffsr.cli_arguments import parser
 from jffsr.errors import InputError
 from jffsr.robots.loading import load_robot
 from jffsr.study.config import load_config
@@ -82,7 +82,7 @@ def check_command(words: list[str], folder: Path) -> None:
     """One command against the parser, the configurations, the Makefile or the module that it names."""
     program, rest = words[0], words[1:]
     if program == "jffsr":
-        arguments = _parser().parse_args(rest)
+        arguments = parser().parse_args(rest)
         if rest[0] == "run":
             load_config(arguments.config, arguments.overrides)
         elif rest[0] == "sweep":
