@@ -23,7 +23,7 @@ STAMP := $(VENV)/.installed-$(PYTHON_VERSION)
 VENV_PYTHON := $(VENV)/bin/python
 PYTEST := $(VENV_PYTHON) -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadfile
 
-.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-browser check-native check-distributed check-sweep check-cluster check-video bench bench-optimizers bench-tracking compare lint constraints clean
+.PHONY: help venv demo test check-optimised check-slow check-physics check-capture captures check-browser check-native check-distributed check-sweep check-cluster check-video docs check-docs bench bench-optimizers bench-tracking compare lint constraints clean
 .DEFAULT_GOAL := help
 
 help:  ## list the targets
@@ -115,6 +115,14 @@ check-video: $(STAMP)  ## draw, encode and decode videos (gets OpenGL by apt-get
 	fi
 	$(VENV_PYTHON) -m pytest -m video $(PYTEST_ARGS)
 
+docs: $(STAMP)  ## build the documentation into site/ (open site/index.html)
+	@$(if $(UV),"$(UV)" pip install --quiet --python "$(VENV_PYTHON)",\
+	    "$(VENV_PYTHON)" -m pip install --quiet --no-input --disable-pip-version-check) -e '.[docs]' -c constraints.txt
+	$(VENV)/bin/zensical build --strict --clean
+
+check-docs: docs  ## build the documentation, look for what it asks of the network, and run every example on it
+	$(VENV_PYTHON) -m pytest -m docs $(PYTEST_ARGS)
+
 lint: $(STAMP)  ## check style and format
 	$(VENV_PYTHON) -m ruff check .
 	$(VENV_PYTHON) -m ruff format --check .
@@ -122,7 +130,7 @@ lint: $(STAMP)  ## check style and format
 # The list must not name a registry: whoever installs uses their own.
 constraints:  ## choose the pinned versions anew (needs uv)
 	@test -n "$(UV)" || { echo "make constraints needs uv on PATH (pip install uv)." >&2; exit 1; }
-	"$(UV)" pip compile --quiet --universal --upgrade --extra test --extra cluster --extra browser --python-version 3.11 --no-header --no-annotate \
+	"$(UV)" pip compile --quiet --universal --upgrade --extra test --extra cluster --extra browser --extra docs --python-version 3.11 --no-header --no-annotate \
 	    --no-emit-index-url --no-emit-find-links --output-file constraints.txt pyproject.toml
 	@! grep -nE '://|^-| @ ' constraints.txt || { echo "constraints.txt names a registry or a path." >&2; exit 1; }
 

@@ -24,7 +24,8 @@ def test_the_study_is_one(tmp_path):
 
 
 def test_the_python_runs_as_it_stands(capsys):
-    (text,) = [text for kind, text in BLOCKS if kind == "python"]
+    text, shown = [text for kind, text in BLOCKS if kind == "python"]
+    assert "docs/examples/track_a_circle.py" in shown  # run by tests/docs/test_examples.py
     names = {}
     exec(text, names)
     assert "position_peak" in capsys.readouterr().out
