@@ -13,6 +13,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "build_a_capability_map.m
 BLOCKS = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
+@pytest.mark.docs
 def test_the_python_runs_as_it_stands(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     # The suite has used JAX before, so that its devices are chosen.

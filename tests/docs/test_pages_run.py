@@ -46,9 +46,15 @@ target = jffsr.Target.create((2.0, 2.5, 3.0), 5.0)
 target_state = jffsr.TargetState.create(place + np.array([0.1, 0.0, 0.0]), (-0.01, 0.0, 0.0), attitude, (0.0, 0.0, 0.5))
 """
 )
+RUN = """
+from jffsr.cli import main
+small = ["optimizer.evaluations=100", "optimizer.gradient_iterations=2", "verification.sensitivity=false"]
+assert main(["run", "composite_wu6", *small, "--out", "runs/composite_wu6"]) in (0, 3)
+"""
 # What a block takes from the text before it, by page and number: it runs before the block.
 BEFORE = {
     ("docs/how-to/plan_for_uncertain_robots.md", 1): PLANAR,
+    ("docs/how-to/see_and_share.md", 1): RUN,
     ("docs/how-to/sweep.md", 1): SWEPT,
     ("docs/how-to/use_all_cores_and_machines.md", 3): "problems = [problem, problem]\n",
     ("docs/theory/capture.md", 4): CONTACT,

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import jax
 import numpy as np
+import pytest
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "compose_a_robot.md"
 
 
+@pytest.mark.docs
 def test_every_block_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     names = {}

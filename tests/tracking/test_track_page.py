@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from jffsr.study.config import load_config
 from jffsr.study.tracking.building import build_task, build_tracker
@@ -23,6 +24,7 @@ def test_the_study_is_one(tmp_path):
     assert build_tracker(section).position_gain == 2
 
 
+@pytest.mark.docs
 def test_the_python_runs_as_it_stands(capsys):
     text, shown = [text for kind, text in BLOCKS if kind == "python"]
     assert "docs/examples/track_a_circle.py" in shown  # run by tests/docs/test_examples.py
