@@ -121,11 +121,17 @@ def _add_watch(commands: argparse._SubParsersAction) -> None:
         description="Show in a browser how a run or sweep gets on, from its folder alone, until Ctrl-C.",
     )
     watch.add_argument("run", metavar="RUN_DIR", help="the folder of a run or sweep, under way or finished")
-    watch.add_argument(
+    _add_server(watch)
+    watch.set_defaults(command="watch")
+
+
+def _add_server(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
         "--port", type=int, metavar="N", help="where the page is served (default: from 8080 on)"
     )
-    watch.add_argument("--no-browser", action="store_true", help="print where the page is, and open nothing")
-    watch.set_defaults(command="watch")
+    command.add_argument(
+        "--no-browser", action="store_true", help="print where the page is, and open nothing"
+    )
 
 
 def _add_sweep(commands: argparse._SubParsersAction) -> None:
