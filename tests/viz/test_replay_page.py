@@ -13,8 +13,10 @@ import pytest
 import zstandard
 from made_replays import boxes_replay
 
+from jffsr.errors import InputError
 from jffsr.viz.replay.recording import all_times
 from jffsr.viz.replay.serving import ReplayPlayer
+from jffsr.viz.replay.viser_server import start_server, stop_server
 from jffsr.viz.report.page import replay_page
 from jffsr.viz.report.plots import draw_panel
 
@@ -130,3 +132,19 @@ def test_a_player_plays_stops_and_begins_anew():
         )
     finally:
         player.close()
+
+
+@pytest.mark.parametrize("port", [0, -1, 65536])
+def test_a_port_that_there_is_none_of_is_refused(port):
+    with pytest.raises(InputError, match=f"--port {port}: a port is a whole number from 1 to 65535"):
+        start_server(port)
+
+
+def test_a_taken_port_gives_way_to_the_next():
+    first = start_server()
+    second = start_server(first.get_port())
+    try:
+        assert second.get_port() != first.get_port()
+    finally:
+        stop_server(first)
+        stop_server(second)
