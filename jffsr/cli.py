@@ -183,7 +183,7 @@ def _show(arguments: argparse.Namespace) -> int:
     for option in ("html", "report", "video"):
         # `jffsr show --html RUN_DIR` means the run, not a file of that name.
         if (name := getattr(arguments, option)) and Path(name).is_dir():
-            arguments.runs.append(name)
+            arguments.runs.insert(0, name)
             setattr(arguments, option, "")
     folders = [Path(run) for run in arguments.runs]
     if not folders:
@@ -192,7 +192,8 @@ def _show(arguments: argparse.Namespace) -> int:
     written = False
     for option, write in (("html", showing.write_page), ("video", showing.write_video)):
         if (name := getattr(arguments, option)) is not None:
-            default = folders[0] / f"replay.{'mp4' if option == 'video' else option}"
+            together = "_and_".join(["replay", *(folder.resolve().name for folder in folders[1:])])
+            default = folders[0] / f"{together}.{'mp4' if option == 'video' else option}"
             print(f"  {option:<12}  {write(folders, Path(name) if name else default)}")
             written = True
     if (name := arguments.report) is not None:

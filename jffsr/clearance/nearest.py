@@ -14,6 +14,7 @@ from types import ModuleType
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.custom_derivatives import SymbolicZero
 
 from jffsr.clearance.boxes import box_box_distance
 from jffsr.clearance.cores import box_segment_distance, segment_segment_distance
@@ -40,9 +41,12 @@ def distances(layout: Layout, numbers: SolidNumbers, position: Components, rotat
     return nearest_distances(jnp, layout, numbers, position, rotation)
 
 
-@distances.defjvp
+# Zeros stay symbols: made into arrays, those of the numbers would be asked for where several devices have each its own.
+@partial(distances.defjvp, symbolic_zeros=True)
 def _distances_jvp(layout, primals, tangents):
-    _, position_dot, rotation_dot = tangents
+    position_dot, rotation_dot = (
+        jax.tree.map(_dense, change, is_leaf=lambda x: isinstance(x, SymbolicZero)) for change in tangents[1:]
+    )
     value, force, moments = distances_and_forces(layout, *primals)
     spin = _spin(primals[2], rotation_dot)
     first, second = np.array(layout.body_pairs).T
@@ -50,6 +54,10 @@ def _distances_jvp(layout, primals, tangents):
     for moment, bodies in zip(moments, (first, second), strict=True):
         change = change + dot(moment, tuple(x[bodies] for x in spin))
     return value, change
+
+
+def _dense(change: Array | SymbolicZero) -> Array:
+    return jnp.zeros(change.shape, change.dtype) if isinstance(change, SymbolicZero) else change
 
 
 def distances_and_forces(
@@ -62,10 +70,11 @@ def distances_and_forces(
     solids = computed_once(jnp, place(numbers, np.array(layout.bodies), position, rotation))
     found, forces, firsts, seconds = [], [], [], []
     for distance, chosen, a, b in _compared(jnp, layout, solids):
-        zero = jnp.zeros_like(b.centre[0])
+        # Not zeros_like, for the same reason.
+        zero = jnp.zeros(b.centre[0].shape, b.centre[0].dtype)
         still = ((zero,) * 3, (zero,) * 3)
         value, pull = jax.vjp(lambda motion, a=a, b=b, d=distance: d(jnp, a, moved(b, *motion)), still)
-        force, turn = computed_once(jnp, pull(jnp.ones_like(value))[0])
+        force, turn = computed_once(jnp, pull(jnp.ones(value.shape, value.dtype))[0])
         # Turning both solids about a's centre changes nothing.
         turn_a = scale(-1.0, add(turn, cross(subtract(b.centre, a.centre), force)))
         lever_a, lever_b = (

@@ -123,7 +123,8 @@ def explain(code: int, problem: Problem, verification: Verification, tolerances:
     elif code is ResultCode.NOT_CONVERGED:
         text = (
             f"accuracy not met: {index} = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search was still "
-            f"moving when its budget ended, so raise the budget"
+            f"moving when its budget ended, so raise the budget (a hybrid's are its swarm_evaluations, starts and "
+            f"gradient_iterations), or allow more time or excursion"
         )
     elif code is ResultCode.NOT_VERIFIED:
         text = (

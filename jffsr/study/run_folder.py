@@ -60,6 +60,8 @@ class RunFolder:
         """The summary of a finished run; InputError when it is not there or damaged."""
         try:
             return json.loads(self.summary.read_text(encoding="utf-8"))
+        except NotADirectoryError:
+            raise InputError(f"{self.path}: is a file; give the folder of a run") from None
         except FileNotFoundError:
             raise InputError(f"{self.path}: not a finished run (no summary.json)") from None
         except (OSError, ValueError) as error:

@@ -172,8 +172,10 @@ class Task(Section):
         self.check_units("start", "goal")
         if len(self.start_si) != len(self.goal_si):
             start, goal = self.key_of("start"), self.key_of("goal")
-            sentence = f"found a list of {len(self.goal_si)}, as many numbers as in '{start}'"
-            raise conflict(f"{sentence} ({len(self.start_si)}) are expected", goal)
+            sentence = (
+                f"found a list of {len(self.goal_si)}, as many numbers as in '{start}' ({len(self.start_si)})"
+            )
+            raise conflict(f"{sentence} are expected, in both one for each joint of the robot", goal)
         return self
 
     @property

@@ -12,6 +12,7 @@ from jffsr.viz.replay.replay import Replay
 from jffsr.writing import write_atomically
 
 SWEEP = "sweep"
+_PAGES = (".html", ".htm")
 _MOST = 16
 """Replays that are shown side by side."""
 
@@ -102,6 +103,8 @@ def _title(paths: Sequence[str | Path]) -> str:
 
 
 def _write(file: Path, text: str) -> Path:
+    if file.suffix.lower() not in _PAGES:
+        raise InputError(f"{file}: a page is written as .html, found the ending '{file.suffix}'")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(file, lambda part: part.write_text(text, encoding="utf-8"))

@@ -158,7 +158,7 @@ REPLACED = {
     ("30", "{min: 3}"): "x.yaml:6: task.duration.max: missing, this key is required",
     ("30", "{min: 3, max: 2}"): "x.yaml:6: task.duration: min is 3 and max is 2, min < max is expected",
     ("[45, 3]", "[45]"): "x.yaml:5: task.goal_deg: found a list of 1, "
-    "as many numbers as in 'start_deg' (2) are expected",
+    "as many numbers as in 'start_deg' (2) are expected, in both one for each joint of the robot",
     ("[45, 3]", "[45, x]"): "x.yaml:5: task.goal_deg.1: found 'x', a number is expected",
     (
         "[45, 3]",

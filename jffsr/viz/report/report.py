@@ -45,7 +45,7 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         section("The motion", motion(lambda: replays_of(folder.path), name)),
         section("The task", _task(config, folder)),
         section("The result", _result(summary)),
-        section("Verification", measured(_verification(summary))),
+        section("Verification", _verification(summary["verification"])),
         section("Figures", figures_block(figures)),
         section("How it was made", made(summary, f"jffsr run {folder.config.name}")),
     ]
@@ -103,6 +103,20 @@ def _result(summary: Mapping[str, Any]) -> str:
     return "\n".join(part for part in [*parts, printed] if part)
 
 
-def _verification(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """Without the terms, which have a table of their own."""
-    return {key: value for key, value in summary["verification"].items() if key != "terms_finer"}
+def _verification(found: Mapping[str, Any]) -> str:
+    """What the finer re-run and the other simulators found; the terms have a table of their own."""
+    simulators = found.get("mujoco")
+    rest = {key: value for key, value in found.items() if key not in ("terms_finer", "mujoco")}
+    if simulators is None:
+        return measured(rest)
+    lines = [
+        line
+        for part in simulators.values()
+        if isinstance(part, list)
+        for line in part
+        if isinstance(line, dict)
+    ]
+    columns = list(dict.fromkeys(key for line in lines for key in line))
+    rows = [[line.get(key) for key in columns] for line in lines]
+    words = f"<p>{escape(str(simulators.get('sentence', '')))}</p>"
+    return measured(rest) + words + table([key.replace("_", " ") for key in columns], rows)
