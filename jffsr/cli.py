@@ -188,6 +188,10 @@ def _show(arguments: argparse.Namespace) -> int:
     folders = [Path(run) for run in arguments.runs]
     if not folders:
         raise InputError("jffsr show: the folder of a finished run or sweep is missing")
+    if arguments.report and len(folders) > 1:
+        raise InputError(
+            f"--report {arguments.report}: each of several runs has a report of its own, in its folder"
+        )
     figures = {folder: _print_one(folder) for folder in folders}
     written = False
     for option, write in (("html", showing.write_page), ("video", showing.write_video)):
@@ -197,8 +201,6 @@ def _show(arguments: argparse.Namespace) -> int:
             print(f"  {option:<12}  {write(folders, Path(name) if name else default)}")
             written = True
     if (name := arguments.report) is not None:
-        if name and len(folders) > 1:
-            raise InputError(f"--report {name}: each of several runs has a report of its own, in its folder")
         for folder in folders:
             file = Path(name) if name else folder / "report.html"
             print(f"  report        {showing.write_report(folder, figures[folder], file)}")

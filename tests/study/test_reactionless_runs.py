@@ -93,6 +93,7 @@ def test_figures_are_drawn(finished):
         assert (folder / "figures" / f"{name}.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_the_page_has_every_run(finished):
     folder, _ = finished
     assert cli.main(["show", "--html", str(folder), "--no-serve"]) == cli.MET
