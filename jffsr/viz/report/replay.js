@@ -14,7 +14,14 @@
     return Number.isFinite(value) ? start + value : null;
   }
 
-  function goTo(time) {
+  // While it plays, the field is written anew all the time, and what is put there may be lost: look, and try again.
+  let wanted = null;
+  function goTo(time, tries = 10) {
+    const mine = (wanted = {});
+    setTimeout(() => {
+      const shown = now();
+      if (wanted === mine && tries && shown !== null && Math.abs(shown - time) > 0.02) goTo(time, tries - 1);
+    }, 150);
     const field = slider()?.closest(".mantine-Paper-root")?.querySelector("input");
     if (!field) return;
     const window_ = frame.contentWindow;
