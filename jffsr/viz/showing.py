@@ -53,11 +53,13 @@ def write_page(paths: Sequence[str | Path], file: Path) -> Path:
     """The replays of runs, side by side, as one HTML file."""
     from jffsr.viz.report.page import replay_page
 
+    _check_page(file)
     return _write(file, replay_page(replays_of_all(paths), _title(paths)))
 
 
 def write_report(path: str | Path, figures: Sequence[Path], file: Path) -> Path:
     """The report of a run or sweep as one HTML file."""
+    _check_page(file)
     if is_sweep(path):
         from jffsr.viz.report.sweep import sweep_report
 
@@ -102,9 +104,12 @@ def _title(paths: Sequence[str | Path]) -> str:
     return " | ".join(Path(path).resolve().name for path in paths)
 
 
-def _write(file: Path, text: str) -> Path:
+def _check_page(file: Path) -> None:
     if file.suffix.lower() not in _PAGES:
         raise InputError(f"{file}: a page is written as .html, found the ending '{file.suffix}'")
+
+
+def _write(file: Path, text: str) -> Path:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(file, lambda part: part.write_text(text, encoding="utf-8"))

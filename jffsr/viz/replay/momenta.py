@@ -71,7 +71,8 @@ def legend_of(replays: Sequence[Replay]) -> list[str]:
     if arrows:
         largest = max(arrow.scale * np.linalg.norm(arrow.vector, axis=1).max() for arrow in arrows)
         lines.append(
-            "Arrows: angular momentum about the centre of mass, blue of the base, orange of the arm; "
+            "Arrows: the robot's angular momentum about its centre of mass, a load not counted: "
+            "blue of the base, orange of the arm; "
             f"the longest is {largest:.3g} N m s."
         )
     return lines

@@ -28,7 +28,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def number(value: Any) -> str:
-    """A value as a reader wants it: numbers to four digits, lists in brackets, None as nothing."""
+    """A value as a reader wants it: numbers to four digits, lists with commas, None as nothing."""
     if value is None:
         return ""
     if isinstance(value, bool):
