@@ -21,6 +21,7 @@ ORDER = [
     "reading",
     "writing",
     "types",
+    "pytrees",
     "compiling",
     "parallel",
     "spatial",

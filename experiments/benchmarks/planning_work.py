@@ -17,6 +17,7 @@ from jffsr.compiling import jit
 from jffsr.optimizers.qpso import QPSO
 from jffsr.parallel.devices import all_devices
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.study.building import build_problem
 from jffsr.study.config import load_config
 
@@ -24,7 +25,7 @@ VALUE, INDEX_GRADIENT, GENERATION = "index", "index and gradient", "generation"
 SCENARIO = "composite_7dof"
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class PlainProblem(Problem):
     """The same problem, its motion by the plain path."""

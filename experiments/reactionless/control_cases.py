@@ -12,6 +12,7 @@ import jffsr
 from jffsr.compiling import jit
 from jffsr.dynamics.kinematics import kinematics, system_com
 from jffsr.dynamics.momentum import inertia_blocks
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.recorded import Recorded
 from jffsr.spatial.inertia import skew
 from jffsr.types import Array, Scalar, Vector
@@ -27,7 +28,7 @@ SWING = 0.3
 _CUT = 1e-10
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Case:
     """A compound right after its plastic capture, its momentum (6,), and the joint motion to follow."""

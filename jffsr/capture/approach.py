@@ -15,6 +15,7 @@ import numpy as np
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.tool_motion import tool_samples
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.spatial.rotation import quaternion_to_matrix
@@ -24,7 +25,7 @@ from jffsr.types import Array, Scalar, Vector, Vector3
 HALF_ANGLE = float(np.deg2rad(30.0))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class ApproachCone:
     """The constraint that the relative velocity lies within half_angle, rad, of the grasp frame's x axis.

@@ -16,6 +16,7 @@ from jffsr.capture.grasp_time_curves import criterion
 from jffsr.capture.inverse_kinematics_floating import floating_inverse_kinematics
 from jffsr.clearance.model import ClearanceModel
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_to_matrix
@@ -27,7 +28,7 @@ LOOKS_AWAY = 1e6
 _ITERATIONS = {False: 8, True: 20}
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class GraspCandidates:
     """What was found, best first.

@@ -24,6 +24,7 @@ from jffsr.clearance.model import ClearanceModel
 from jffsr.errors import InputError
 from jffsr.planning.fingerprint import fingerprint
 from jffsr.planning.plan import check_precision
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.spatial.rotation import matrix_to_quaternion
 from jffsr.types import Array, Scalar, Vector3
@@ -31,7 +32,7 @@ from jffsr.types import Array, Scalar, Vector3
 BLOCK_POSES = 25_600
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class CapabilityMap:
     """Shares of poses that an arm reaches, on a grid of cubic cells in the base frame B.

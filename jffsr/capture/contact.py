@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -23,6 +22,7 @@ from jffsr.capture.contact_bodies import (
     meeting_momentum,
 )
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.lumping import on_host, to_array
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -35,7 +35,7 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 """Translations along and rotations about the axes of the end effector's frame."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Contact:
     """What an impact leaves behind.

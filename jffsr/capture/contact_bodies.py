@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.dynamics.kinematics import Kinematics, end_effector_pose, jacobians, kinematics, system_com
 from jffsr.dynamics.momentum import inertia_blocks, kinetic_energy, momentum
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -22,7 +22,7 @@ from jffsr.types import Array, Matrix, Quaternion, Scalar, Twist, Vector3
 JOINTS_FREE, JOINTS_LOCKED = "free", "locked"
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Meeting:
     """Both at the instant of contact, all resolved in I.

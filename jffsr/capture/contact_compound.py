@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.capture.contact import Contact, grasp_impact
 from jffsr.capture.contact_bodies import JOINTS_FREE
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.composing.composition import weld
 from jffsr.robots.rigid_body import RigidBody
 from jffsr.robots.robot import Robot
@@ -20,7 +20,7 @@ from jffsr.target.target_state import TargetState
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Compound:
     """A robot with its target, right after a rigid grasp.

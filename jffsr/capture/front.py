@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -26,6 +25,7 @@ from jffsr.objectives.terms import Term
 from jffsr.optimizers.pareto import not_dominated
 from jffsr.optimizers.sequential_quadratic import SequentialQuadratic
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array, Scalar
@@ -46,7 +46,7 @@ _ALIKE = 1e-4
 _LOST = "lost_"
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class WeightedTerms:
     """A sum of terms with weights (t,) that may be zero, each over its own scale; a term of an index itself."""

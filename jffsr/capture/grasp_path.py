@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.target.grasp_frames import fixed_frame
 from jffsr.target.target_state import TargetState
 from jffsr.target.tumbling import TargetMotion
 from jffsr.types import Array, Quaternion, Scalar, Twist, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class GraspPath:
     """A frame (position_T (3,), m, and quaternion_T (4,), G to T) on a moving target, by the robot's own time.

@@ -13,6 +13,7 @@ from jffsr.capture.inverse_kinematics_step import limited_step
 from jffsr.compiling import program
 from jffsr.errors import InputError
 from jffsr.parallel.mapping import spread
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.types import Array
 
@@ -22,7 +23,7 @@ CHUNK = 512
 """Poses at a time on one core: what they need stays in its second-level cache."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointSolutions:
     """What was found from each of k starts for poses (...).

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.tool_motion import tool_samples
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.spatial.rotation import (
@@ -19,7 +19,7 @@ from jffsr.spatial.rotation import (
 from jffsr.types import Array, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class GraspMatch:
     """The constraint that the tool has the grasp frame's pose and twist when the motion ends.

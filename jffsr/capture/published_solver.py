@@ -35,6 +35,7 @@ from jffsr.parallel.mapping import spread
 from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances
 from jffsr.planning.verification import Verification
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.stacking import first_unlike, stacked
 from jffsr.types import Array, Scalar, Vector
 
@@ -48,7 +49,7 @@ _STORED = 2 * np.sqrt(6.0)
 _GENERATIONS_AT_ONCE = 20
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class MatchProblem:
     """A capture, of given duration, as the published fitness sees it: for a swarm."""
@@ -89,7 +90,7 @@ def published_match(error: Vector) -> Scalar:
     return jnp.sqrt(jnp.sum((100 * position) ** 2) + half**2) + 100 * jnp.linalg.norm(velocity)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RepairingSwarm(PSO):
     """The swarm whose particles are repaired where they land, and that stores the `archive` (static) best matches that

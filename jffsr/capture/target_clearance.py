@@ -9,12 +9,13 @@ import jax.numpy as jnp
 
 from jffsr.capture.grasp_path import GraspPath
 from jffsr.objectives.clearance import Clearance
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TargetClearance:
     """The constraint `keep` with the target where the path has it, also where the motion's duration is free."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -12,6 +11,7 @@ from jffsr.capture.grasp_path import GraspPath
 from jffsr.capture.manipulability import FORCE, grasped_jacobian, manipulability
 from jffsr.objectives.composite import CompositeIndex
 from jffsr.objectives.smoothing import Smoothing
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
@@ -20,7 +20,7 @@ from jffsr.spatial.safe import safe_norm, smooth_norm
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class BaseDisturbance:
     """|Q_b dx_b|: how far the base is from its start at the end, Wang et al. 2021, eq. (26), the errata's norm.
@@ -50,7 +50,7 @@ class BaseDisturbance:
         return jnp.concatenate([self.position * moved, self.attitude * turn[1:]])
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class LostManipulability:
     """The negative of a measure of manipulability at the grasp, so that less is better; may be below zero.
@@ -85,7 +85,7 @@ class LostManipulability:
         return jnp.concatenate([rotation @ wrench[:3], rotation @ wrench[3:]])
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ExecutionTime:
     """How long the motion lasts, s, over `scale`; of use where the duration is free. Wang et al. 2021, eq. (16)."""
@@ -102,7 +102,7 @@ class ExecutionTime:
         return self.value(robot, motion)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class IndexAtMost:
     """The constraint that an index is at most `level`, which may be below zero; in units of the index."""

@@ -9,13 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.kinematics import end_effector_pose, jacobians, kinematics
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ToolSamples:
     """time (k,), s; position (k, 3), m; quaternion (k, 4), E to I; twist (k, 6), [linear; angular], in I."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
 
-import jax
 import numpy as np
 
 from jffsr.clearance.joined import always_touching
@@ -16,6 +15,7 @@ from jffsr.clearance.numerics import arrays_for, module_for
 from jffsr.clearance.pairs import body_names, body_pairs
 from jffsr.clearance.solids import Solid, solid_of
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.geometry import COLLISION, Geometry
 from jffsr.robots.robot import Robot, Topology
 from jffsr.spatial.components import Components, Rows
@@ -25,7 +25,7 @@ CAPSULES, EXACT = "capsules", "exact"
 ARMS = (CAPSULES, EXACT)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class ClearanceModel:
     """Signed distances, m, of all pairs of bodies that can meet, from their collision shapes.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import REVOLUTE, Robot
 from jffsr.robots.state import State
 from jffsr.spatial.inertia import skew
@@ -14,7 +14,7 @@ from jffsr.spatial.rotation import axis_angle_to_matrix, matrix_to_quaternion, q
 from jffsr.types import Array, Matrix, Quaternion, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Kinematics:
     """Poses and Jacobians of a robot in one state, all resolved in I.

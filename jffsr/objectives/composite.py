@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -28,6 +27,7 @@ from jffsr.objectives.terms import (
     Term,
     ToolPosition,
 )
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Scalar
@@ -42,7 +42,7 @@ class TermValue(NamedTuple):
     weighted: Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class CompositeIndex:
     """The sum of weighted terms; their names must differ. `accuracy` is the J that counts as met."""

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.objectives.terms import ROTATION_VECTOR, attitude_angles
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.spatial.rotation import (
@@ -53,7 +53,7 @@ def largest_violation(constraint: Constraint, robot: Robot, motion: Motion) -> S
     return jnp.max(amounts, initial=0.0)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class FinalAttitude:
     """The base's attitude at the end is `goal` (4,), B to I: the rotation vector, rad, of the error is zero.
@@ -75,7 +75,7 @@ class FinalAttitude:
         return jnp.zeros(0)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointLimits:
     """Every joint keeps its limits at all times: relative overruns of the peaks of position, rate, acceleration.
@@ -113,7 +113,7 @@ class JointLimits:
         return jnp.concatenate(overruns)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class BaseExcursion:
     """The base's turn from its start stays within `limit` (3,), rad, about each axis at all times.

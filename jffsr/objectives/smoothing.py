@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.safe import peak, safe_norm, smooth_hinge, smooth_max, smooth_norm
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Smoothing:
     """Widths of the rounding; as all three tend to zero, every smooth term tends to the published one.

@@ -24,10 +24,11 @@ from jffsr.optimizers.driver import Phase, Stop
 from jffsr.optimizers.gradient import LBFGS, GradientDescent, GradientState, beginning, select, usable
 from jffsr.optimizers.interface import Population, Progress
 from jffsr.parallel.mapping import evaluate
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Multipliers:
     """Of one start: equality (e,), inequality (i,), penalty (), and how far the constraints were missed at the
@@ -39,7 +40,7 @@ class Multipliers:
     miss: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AugmentedState:
     """The descents of all starts (k,), their multipliers, and where each stands in its round.
@@ -64,7 +65,7 @@ class AugmentedState:
         return self.inner.progress
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AugmentedLagrangian:
     """Constrained descent from the starts of `descent`, whose own settings hold within a round.

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 TOLERANCE = 1e-8
@@ -81,7 +81,7 @@ def split(merits: Any, dtype: Any = np.float64) -> tuple[np.ndarray, np.ndarray]
     return np.where(broken, np.inf, merits), np.where(broken, merits / big, 0.0)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Feasible:
     """A constrained problem for any optimizer: its value is the merit.
@@ -112,7 +112,7 @@ class Feasible:
         return found.smooth + 0.5 * self.penalty * squares, merit(found)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ConstrainedFunctions:
     """Functions of one candidate with bounds (d,) each; the functions are static, None where there is none."""

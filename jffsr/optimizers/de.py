@@ -18,13 +18,14 @@ from jffsr.optimizers.hyperparameters import choice, number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width
 from jffsr.optimizers.randoms import distinct_others, uniforms
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 RAND, PBEST, CURRENT_TO_BEST = "rand", "pbest", "current_to_best"
 SMALLEST = 4  # members that differ from each other in a rand/1 mutant
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class DE(PopulationOptimizer):
     """Each member's rival is a mutant crossed with it, and takes its place where it is no worse.

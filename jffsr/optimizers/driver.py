@@ -21,10 +21,11 @@ from jffsr.optimizers import history as history_of
 from jffsr.optimizers.history import Record
 from jffsr.optimizers.interface import OptimizationProblem, Optimizer, Population, Progress
 from jffsr.parallel.devices import all_devices, on_all_devices
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Stop:
     """When a phase ends: counts of its own iterations, objective and gradient evaluations, or a value."""

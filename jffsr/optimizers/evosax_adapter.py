@@ -21,6 +21,7 @@ from jffsr.errors import InputError
 from jffsr.optimizers.hyperparameters import choice, number
 from jffsr.optimizers.interface import OptimizationProblem, Population
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 # Those of evosax that were tried here on shifted functions; they compare values over generations (POPULATIONS), or
@@ -29,7 +30,7 @@ DISTRIBUTIONS = ("CMA_ES", "Sep_CMA_ES", "SNES", "CR_FM_NES", "MA_ES")
 POPULATIONS = ("PSO", "DifferentialEvolution")
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Evosax(PopulationOptimizer):
     """A strategy of evosax; `spread` is the standard deviation that it begins with, in box widths.

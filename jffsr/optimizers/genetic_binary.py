@@ -18,12 +18,13 @@ from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width
 from jffsr.optimizers.randoms import uniforms
 from jffsr.optimizers.selection import RANK, ROULETTE, TOURNAMENT, select
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 ONE_POINT, UNIFORM = "one_point", "uniform"
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class BinaryGA(PopulationOptimizer):
     """Every number of a candidate is a code of `bits` bits, from 0 at its lower bound to all ones at its upper.

@@ -20,12 +20,13 @@ from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width
 from jffsr.optimizers.randoms import uniforms
 from jffsr.optimizers.selection import RANK, ROULETTE, TOURNAMENT, select
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 SBX, BLEND = "sbx", "blend"
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RealGA(PopulationOptimizer):
     """Parents are selected and mated in pairs with probability crossover_rate; children are clipped to the box.

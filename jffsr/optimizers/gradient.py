@@ -30,6 +30,7 @@ from jffsr.optimizers.interface import (
     sample_box,
 )
 from jffsr.parallel.mapping import evaluate
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 T = TypeVar("T")
@@ -44,7 +45,7 @@ _ROUNDING = 1e-13
 _SHORTEST_STEP = 1e-10
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Descent:
     """One start: point, smooth value and gradient accepted last, the search direction, and the step length
@@ -70,7 +71,7 @@ class Descent:
     best_value: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class GradientState:
     """key; a batch of descents, leading axis (k,), and the progress of all."""
@@ -80,7 +81,7 @@ class GradientState:
     progress: Progress
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class GradientDescent:
     """L-BFGS or Adam from `starts` points: the best of a given population, else uniform in the box.

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 
@@ -33,7 +34,7 @@ class OptimizationProblem(Protocol):
     def smooth_and_value(self, candidate: Vector, looseness: Scalar) -> tuple[Scalar, Scalar]: ...
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class FunctionProblem:
     """Any function of one candidate, with bounds (d,) each; the function is static."""
@@ -56,7 +57,7 @@ class FunctionProblem:
         return value, value
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Progress:
     """What every optimizer's state carries for the driver.

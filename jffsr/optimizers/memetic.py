@@ -19,6 +19,7 @@ from jffsr.optimizers.hyperparameters import choice, option_fields, size
 from jffsr.optimizers.interface import OptimizationProblem, Population, better_of
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState
 from jffsr.optimizers.registry import GENERATIONAL, Settings, built, swarm_of, swarm_phase
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 
@@ -31,7 +32,7 @@ class _Options:
     steps: int = size(5, 1, 1000)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Memetic:
     """A population method of which, every `period` generations, the best members make `steps` gradient steps.

@@ -20,6 +20,7 @@ from jffsr.optimizers.interface import box_of
 from jffsr.optimizers.polishing import polished
 from jffsr.parallel.devices import all_devices
 from jffsr.parallel.mapping import spread
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 # What NSGA-II is told of a candidate whose objectives are not finite: anything beats it.
@@ -40,7 +41,7 @@ class MultiObjectiveProblem(Protocol):
     def smooth_and_values(self, candidate: Vector, looseness: Scalar) -> tuple[Vector, Vector]: ...
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class FunctionObjectives:
     """Any function of one candidate that gives several numbers, with bounds (d,) each; the function is static."""

@@ -22,6 +22,7 @@ from jffsr.compiling import program
 from jffsr.optimizers.gradient import GradientDescent
 from jffsr.optimizers.interface import Population
 from jffsr.parallel.mapping import spread
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.safe import smooth_max
 from jffsr.types import Array, Scalar, Vector
 
@@ -34,7 +35,7 @@ _BEYOND = 0.1
 _STAGES = ((10.0, 1e-2), (1.0, 1e-3), (1.0, 1e-5))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Member:
     """The scalarisation of one member: its values (m,), the corner z (m,), the width of the rounded maximum, and

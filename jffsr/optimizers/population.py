@@ -22,10 +22,11 @@ from jffsr.optimizers.interface import (
     sample_box,
 )
 from jffsr.parallel.mapping import evaluate
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PopulationState:
     """key; position (P, d), evaluated next; kept (P, d) and kept_value (P,), what the method goes by; `own`, what

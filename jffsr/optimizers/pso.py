@@ -19,10 +19,11 @@ from jffsr.optimizers.hyperparameters import choice, flag, number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width, fraction_done
 from jffsr.optimizers.randoms import uniform_pairs, uniforms
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PSO(PopulationOptimizer):
     """The swarm with velocities; the default is the constricted one of Clerc and Kennedy.

@@ -21,13 +21,14 @@ from jffsr.optimizers.hyperparameters import choice, number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, fraction_done
 from jffsr.optimizers.registry import LARGEST_CONTRACTION
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar
 
 RANK_WEIGHTS = (1.5, 0.5)
 """Weights of the best and the worst particle in the weighted mean; those between fall linearly, their mean is 1."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class QPSO(PopulationOptimizer):
     """The swarm; every particle moves about its attractor by a Laplace step of the mean best distance.

@@ -25,13 +25,14 @@ from jffsr.optimizers.interface import (
     sample_box,
 )
 from jffsr.parallel.mapping import evaluate
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 _LEAST_DAMPING, _MOST_DAMPING = 1e-12, 1e12
 _PATIENCE = 10
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Trials:
     """A batch of starts (k, ...): the point accepted last, its residual (r,) and Jacobian (r, d), the trial that is
@@ -50,7 +51,7 @@ class Trials:
     active: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RestorationState:
     """key; the trials, and the progress of all."""
@@ -60,7 +61,7 @@ class RestorationState:
     progress: Progress
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Restoration:
     """Levenberg-Marquardt steps to where the constraints are kept, from `starts` (static) points.

@@ -31,6 +31,7 @@ from jffsr.optimizers.interface import (
 )
 from jffsr.optimizers.quadratic_program import quadratic_step
 from jffsr.parallel.mapping import evaluate
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 _ACCEPT, _GOOD = 1e-4, 0.75
@@ -40,7 +41,7 @@ _STIFF = 1e3
 _CLOSING_STEPS, _CLOSING_RADIUS = 15, 0.02
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Local:
     """What one trial tells: value of the objective (), its gradient (d,), rows (r,), equalities first, and their
@@ -54,7 +55,7 @@ class Local:
     kept: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Searches:
     """A batch of starts (k, ...): the point accepted last, in scaled numbers, and what is known there; the model's
@@ -78,7 +79,7 @@ class Searches:
     active: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class SequentialState:
     """The searches, and the progress of all."""
@@ -87,7 +88,7 @@ class SequentialState:
     progress: Progress
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class SequentialQuadratic:
     """Steps of sequential quadratic programming from `starts` (static) points.

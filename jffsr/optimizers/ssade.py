@@ -20,10 +20,11 @@ from jffsr.optimizers.hyperparameters import number
 from jffsr.optimizers.interface import OptimizationProblem
 from jffsr.optimizers.population import PopulationOptimizer, PopulationState, box_width
 from jffsr.optimizers.randoms import uniforms
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class SSADE(PopulationOptimizer):
     """Differential evolution by stages: rand/1 while spread out, pbest/1 between, current-to-best/1 when gathered.

@@ -18,6 +18,7 @@ from jffsr.errors import InputError
 from jffsr.objectives.constraints import Constraint
 from jffsr.optimizers.constraints import Evaluation
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.design import Design, mounted_joints, no_change, redesigned
 from jffsr.types import Array, Scalar, Vector
 
@@ -51,7 +52,7 @@ def _designed(problem: Problem, design: Design, mass_exponent: Scalar) -> Proble
     return replace(problem, robot=redesigned(problem.robot, design, mass_exponent))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class CoDesign:
     """A planning problem whose robot's proportions are free numbers too, for `jffsr.solve`.

@@ -25,6 +25,7 @@ from jffsr.planning.problem import Problem
 from jffsr.planning.result import Tolerances, result_code, settled
 from jffsr.planning.search import found_index, search_of, searchable
 from jffsr.planning.verification import Verification, verify
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.stacking import first_unlike
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
@@ -32,7 +33,7 @@ from jffsr.types import Array
 CHUNK_BETWEEN_CHECKPOINTS = 64
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PlanHistory:
     """Best value so far after every step, and what was spent until then, (K, steps) each."""
@@ -42,7 +43,7 @@ class PlanHistory:
     gradient_evaluations: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Plans:
     """A batch of verified plans on the host, leading axis (K,) on every array.

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.errors import InputError
 from jffsr.optimizers.pareto import ParetoSet, pareto_set
 from jffsr.planning.plan import check_precision
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class TermObjectives:
     """Groups of terms of a problem's index as objectives, each the sum of its weighted terms; static by their names."""

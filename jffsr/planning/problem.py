@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -13,6 +12,7 @@ from jffsr.objectives.composite import CompositeIndex, TermValue
 from jffsr.objectives.constraints import Constraint, tolerance_of
 from jffsr.optimizers.constraints import Evaluation
 from jffsr.planning.uncertainty import Uncertainty
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.joint_torque import with_joint_torque
@@ -30,7 +30,7 @@ def _at_rest_at_origin() -> State:
     return State(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(0))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Choose the free numbers of `trajectory` so that the index of the motion is least under the constraints.

@@ -18,6 +18,7 @@ import numpy as np
 from jffsr.compiling import program
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import (
     quaternion_conjugate,
@@ -34,7 +35,7 @@ _ROWS, _COLUMNS = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 _PLACE = np.array([[0, 3, 4], [3, 1, 5], [4, 5, 2]])
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Inertials:
     """Something for each body's mass (..., b) and for each of the six elements of its inertia (..., b, 6)."""
@@ -43,7 +44,7 @@ class Inertials:
     inertia: Any
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PlanEnd:
     """What a plan leads to, or derivatives of it.

@@ -11,6 +11,7 @@ import numpy as np
 
 from jffsr.errors import InputError
 from jffsr.objectives.risk import smooth_value_at_risk_mean, value_at_risk_mean
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.perturbation import perturbed
 from jffsr.robots.robot import Robot
 from jffsr.types import Array, Scalar
@@ -18,7 +19,7 @@ from jffsr.types import Array, Scalar
 MEASURES = ("expected", "worst_case", "cvar")
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Robots that a plan has to serve, and how their indices become one.

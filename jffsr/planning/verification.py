@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.objectives.composite import CompositeIndex, TermValue
@@ -12,6 +11,7 @@ from jffsr.objectives.constraints import largest_violation
 from jffsr.objectives.terms import AttitudeExcursion, attitude_angles
 from jffsr.objectives.torque_terms import JointTorque
 from jffsr.planning.problem import Problem
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.conservation import momentum_drift
 from jffsr.rollouts.joint_torque import with_joint_torque
@@ -27,7 +27,7 @@ from jffsr.trajectories.interface import PlannedTrajectory
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Overruns:
     """Relative overruns of the limits on the finer grid; negative inside, -1 or -inf where nothing moves.
@@ -43,7 +43,7 @@ class Overruns:
     torque: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Verification:
     """What the finer re-run by the reference path says of a plan.

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import jax
-
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Quaternion, Scalar, Vector, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Sensors at one sample.
@@ -32,7 +31,7 @@ class Measured:
     fresh: Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Desired:
     """Joint motion (n,) to follow at a sample: joint_position, joint_velocity, joint_acceleration, rad or m, per s."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 # Columns: powers of s, 0 to 5, for unit position, rate and acceleration at the start of a step, then at its end.
@@ -23,7 +23,7 @@ _QUINTIC = np.array(
 )
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class SampledPath:
     """Quintic pieces through joint positions, rates and accelerations (N + 1, n) at equal steps of duration/N, s.

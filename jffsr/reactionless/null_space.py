@@ -20,6 +20,7 @@ import jax.numpy as jnp
 from jffsr.dynamics.kinematics import Kinematics, jacobians, system_com
 from jffsr.dynamics.momentum import base_twist, inertia_blocks
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.spatial.inertia import skew
 from jffsr.spatial.safe import safe_norm
@@ -58,7 +59,7 @@ SENTENCES = {
 }
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class ReactionlessRates:
     """Joint rates that hold the base's attitude, and what is left to say of them.

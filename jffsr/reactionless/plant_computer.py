@@ -8,13 +8,14 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.interface import Controller, Desired, Measured, Reference
 from jffsr.reactionless.plant_settings import LoopSettings
 from jffsr.robots.state import State
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Memory:
     """What the computer carries from sample to sample: states of reference and controller, torques (delay, n) on their
@@ -27,7 +28,7 @@ class Memory:
     base_twist: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Decision:
     """A sample's outcome: desired motion, torques (n,) asked for and given, where the limit acted, the disturbance (n,)

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.plant_settings import LoopSettings
 from jffsr.robots.state import State
 from jffsr.types import Array, Scalar
@@ -42,7 +43,7 @@ def loop_sentence(code: Array | int) -> str:
     return _SENTENCES[LoopCode(int(code))]
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class LoopRun:
     """A closed loop at its N samples, each before its torque acts.

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 
-import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Sensors:
     """Standard deviations of white noise on every sample, and when nothing is measured.
@@ -38,7 +38,7 @@ class Sensors:
                 raise InputError(f"{name} is {value!r}; a standard deviation of at least 0 is expected")
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointDisturbance:
     """Unknown torque in every joint, N m or N: constant + random u sign(qd), u uniform in [0, 1), drawn each sample.
@@ -56,7 +56,7 @@ class JointDisturbance:
         return cls(0.5, 1.0)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Strike:
     """A wrench (6,), [force, N; moment, N m, about the tool], in the axes of the tool, from `time` for `duration`, s.
@@ -72,7 +72,7 @@ class Strike:
         _positive("duration of a strike", self.duration)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Bounds:
     """Beyond what a run is said to have failed.
@@ -87,7 +87,7 @@ class Bounds:
     error: Array | float = 0.1
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class LoopSettings:
     """A sampled loop: `samples` of a control period, s, each with `substeps` integration steps of the plant.

@@ -15,15 +15,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Limits
 from jffsr.tracking.redundancy import range_share
 from jffsr.types import Array, Matrix, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RangesKept:
     """Joints led away from the ends of their ranges; those without a range, or not near its end, are left alone.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.checks import check_rigid, check_shape
 from jffsr.robots.geometry import Geometry, Shape
 from jffsr.robots.lumping import on_host, to_array
@@ -16,7 +16,7 @@ from jffsr.robots.robot import Limits, Robot, Topology
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class RigidBody:
     """A rigid body, all of whose numbers are differentiable.

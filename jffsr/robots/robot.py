@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.geometry import Geometry
 from jffsr.types import Array
 
@@ -62,7 +62,7 @@ class Topology:
         return np.array([kind == REVOLUTE for kind in self.joint_types], dtype=bool)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Limits:
     """Joint limits, shape (n,) each, in rad and m; infinite where there is none."""
@@ -87,7 +87,7 @@ class Limits:
         return cls(*(np.full(num_joints, float(bound)) for bound in bounds))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A tree of rigid bodies on a free base.

@@ -10,12 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
-
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.components import Components, Symmetric, subtract, symmetric_times
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointTerms:
     """Base-frame terms on a grid of G points; every component has shape (G,).

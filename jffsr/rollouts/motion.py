@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.dynamics.base_mode import FLOATING
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.interface import Trajectory
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointGrid:
     """Joint motion at the 2N + 1 grid points and midpoints that a Runge-Kutta step needs.
@@ -26,7 +27,7 @@ class JointGrid:
     joint_acceleration: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Motion:
     """A motion of the whole robot on N + 1 samples.

@@ -12,6 +12,7 @@ import numpy as np
 from jffsr.dynamics.base_mode import FLOATING, base_freedom
 from jffsr.dynamics.equations_of_motion import forward_dynamics
 from jffsr.dynamics.kinematics import kinematics
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.rollout import check_steps
@@ -22,7 +23,7 @@ Torque = Callable[[Scalar, State], Vector]
 """Joint torques (n,), N m or N, at a time, s, in a state."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class DrivenMotion:
     """A motion under joint torques on N + 1 samples.

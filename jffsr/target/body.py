@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint
 from jffsr.robots.checks import check_rigid
 from jffsr.robots.geometry import Geometry
@@ -23,7 +23,7 @@ Frame = tuple[Vector3, Quaternion]
 """Origin (3,), m, and unit quaternion (4,) of a frame, in the frame it is fixed to."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Target:
     """A rigid body in the frame T, whose origin is its centre of mass; all numbers are differentiable.

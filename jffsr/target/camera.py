@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -63,7 +64,7 @@ class Camera:
         return np.diag(np.repeat([self.position_deviation**2, self.attitude_deviation**2], 3))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Measurements:
     """Poses of the marker frame, sample by sample.

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.target.camera import Measurements
 from jffsr.target.estimate import NUM_ERRORS, TargetEstimate, corrected, error_of
 from jffsr.target.filter_steps import MEASURED, advance, innovation
@@ -90,7 +91,7 @@ def curved_estimate(
     return replace(corrected(estimate, mean), covariance=estimate.covariance + added)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class _Nodes:
     """Instants at which other motions are compared with the best one, later and earlier than the middle of all poses.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -26,7 +26,7 @@ POSITION, VELOCITY, OFFSET = slice(11, 14), slice(14, 17), slice(17, 20)
 NUM_ERRORS = 20
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TargetEstimate:
     """An estimate of a target at a time; leading batch axes are allowed.

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.target.acquisition import acquire
 from jffsr.target.camera import Camera, Measurements
 from jffsr.target.estimate import TargetEstimate
@@ -60,7 +61,7 @@ class FilterSettings:
         return float(chi2.ppf(self.gate_probability, 6))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class FilteredTarget:
     """A filter's course over the M samples that follow the acquisition.

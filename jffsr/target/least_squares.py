@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.target.camera import Measurements
 from jffsr.target.estimate import NUM_ERRORS, TargetEstimate
 from jffsr.target.filter_steps import MEASURED, advance, innovation
@@ -23,7 +24,7 @@ from jffsr.types import Array, Matrix, Scalar
 _VAGUE = 1e-8 * np.eye(NUM_ERRORS)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class FitPass:
     """What one pass over the poses finds, all about the motion that it started from.

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.rotation import (
     quaternion_conjugate,
     quaternion_multiply,
@@ -28,7 +29,7 @@ AT_MARKER: Frame = (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 """The marker frame itself, as a grasp frame."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class GraspPrediction:
     """A grasp frame at a time, with the uncertainty of the prediction.

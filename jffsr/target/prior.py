@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.lumping import on_host, to_array
 from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.target.estimate import NUM_ERRORS, TargetEstimate, corrected
@@ -16,7 +17,7 @@ from jffsr.target.inertia_parameters import NUM_PARAMETERS, checked_parameters
 from jffsr.types import Array, Matrix
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TargetPrior:
     """Means and standard deviations of what a camera does not see at once; position and attitude are wide open.

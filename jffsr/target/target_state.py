@@ -5,10 +5,10 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.lumping import array_module, on_host, to_array
 from jffsr.types import Array, Quaternion
 
@@ -16,7 +16,7 @@ from jffsr.types import Array, Quaternion
 _ROUNDED, _MISTAKEN = 1e-3, 5e-2
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TargetState:
     """Pose and velocity of a target's frame T, whose origin is the centre of mass; leading batch axes are allowed.

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.lumping import on_host
 from jffsr.spatial.rotation import quaternion_multiply
 from jffsr.target.body import Target
@@ -22,7 +23,7 @@ from jffsr.target.target_state import TargetState
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TargetMotion:
     """A target's motion on [0, duration], s, as Taylor series on equal steps; call it with a time.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
@@ -14,7 +15,7 @@ from jffsr.rollouts.reference import reference_rollout
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class HeldRates:
     """Joints that go straight from one sample to the next: a trajectory, (q, qd, 0) at a time.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.safe import peak, safe_norm, safe_sqrt, smooth_hinge, smooth_max, smooth_norm
 from jffsr.tracking.tracked import Tracked
 from jffsr.types import Array, Scalar
@@ -63,7 +63,7 @@ def rate_overrun(tracked: Tracked, limit: Array | float) -> Scalar:
     return jnp.sum(jnp.maximum(peaks / limit - 1, 0.0))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PublishedIndex:
     """B at the end of the path plus `weight` times the relative overrun of a rate limit, rad/s.
@@ -89,7 +89,7 @@ class PublishedIndex:
         return error + self.weight * _smooth_overrun(tracked, self.rate_limit, looseness)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PathError:
     """Pose error over the whole path, m, with a weight on the overrun of a rate limit.

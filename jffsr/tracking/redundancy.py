@@ -15,6 +15,7 @@ import jax.numpy as jnp
 
 from jffsr.dynamics.kinematics import Kinematics, kinematics
 from jffsr.dynamics.momentum import generalized_jacobian
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Limits, Robot
 from jffsr.robots.state import State
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply, quaternion_to_rotation_vector
@@ -65,7 +66,7 @@ def limit_gradient(robot: Robot, joint_position: Vector) -> Vector:
     return share / (half * joint_position.size)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointLimitAvoidance:
     """Joints drawn to the middle of their ranges: down the gradient of the mean of ((q - mid)/half range)^2/2.
@@ -84,7 +85,7 @@ class JointLimitAvoidance:
         ), space
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ManipulabilityGradient:
     """Posture with more manipulability: rates gain times the gradient of log sqrt(det(J* J*' + width^2 1)).
@@ -111,7 +112,7 @@ class ManipulabilityGradient:
         return rates + self.gain * (space @ jax.grad(log_manipulability)(s.state.joint_position)), space
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class BaseAttitudeHeld:
     """The base's attitude kept at that of the start: a second task on the base's angular velocity.

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.cartesian.interface import ToolTarget
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Retimed:
     """The target, at other times of its own: linear between the samples.

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
-
+from jffsr.pytrees import register_dataclass
 from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Tracked:
     """A tracked motion on K + 1 samples, K being the number of times that rates were found and held.

@@ -10,6 +10,7 @@ import jax
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint
 from jffsr.robots.robot import REVOLUTE, Robot
 from jffsr.robots.state import State
@@ -32,7 +33,7 @@ def _static(default: Any) -> Any:
     return field(default=default, metadata={"static": True})
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Tracker:
     """Resolved-rate tracking on the generalized Jacobian (Umetani and Yoshida 1989).

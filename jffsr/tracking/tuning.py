@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
@@ -25,7 +25,7 @@ TUNABLE = ("lambda_max", "epsilon", "damping", "threshold", "position_gain", "at
 """Numbers of a tracker that can be searched for."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class TuningProblem:
     """Choose named numbers of `tracker` so that the index of the tracked path is least.

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jffsr.dynamics.base_mode import base_freedom
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics, system_com
 from jffsr.dynamics.spatial_tree import body_twists, spatial_inertias
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.conservation import momentum_from_poses
@@ -23,7 +24,7 @@ from jffsr.types import Array, Scalar
 LEAST_STEPS = 8
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class TrackingVerification:
     """What the finer re-run by the reference path says of a tracked motion.

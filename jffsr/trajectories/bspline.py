@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.checks import (
     checked_box,
     checked_duration,
@@ -37,7 +37,7 @@ _LEAST_DEGREE = 3  # below, the acceleration jumps inside the motion
 _PER_SPAN = 32
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class ClampedBSpline:
     """Joint motion from rest or under way, to rest at a goal or to wherever the free control points lead.

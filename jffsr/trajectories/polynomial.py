@@ -18,11 +18,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.checks import (
     checked_box,
     checked_duration,
@@ -49,7 +49,7 @@ _HERMITE = np.array(
 ).T
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Polynomial:
     """Joint motion between given states, with `degree` - 5 free numbers per joint.

@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.trigonometry import sine_cosine
 from jffsr.trajectories.checks import checked_duration, checked_duration_bounds
 from jffsr.trajectories.interface import Boundary
@@ -31,7 +31,7 @@ from jffsr.types import Array, Scalar, Vector
 _ON_LIMIT = 1e-9
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class SinePolynomial:
     """Rest-to-rest joint motion inside position limits, with two free numbers per joint.

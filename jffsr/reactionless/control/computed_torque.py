@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.dynamics.equations_of_motion import inverse_dynamics
 from jffsr.dynamics.kinematics import kinematics
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.errors import Gains, tracking_errors
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.robots.robot import Robot
@@ -16,7 +16,7 @@ from jffsr.robots.state import State
 from jffsr.types import Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ComputedTorque:
     """tau = H*(q) a + c* with a = qdd_d + K r + Lambda e_dot: linear error dynamics where the model is exact.

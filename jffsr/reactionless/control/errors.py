@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.dynamics.kinematics import kinematics
 from jffsr.dynamics.momentum import generalized_inertia
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.types import Array, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Gains:
     """K (n,), 1/s, and Lambda (n,), 1/s, diagonal: an error dies out as exp(-Lambda t) once r = 0, r as exp(-K t)."""
@@ -46,7 +46,7 @@ class Gains:
         return gains
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Errors:
     """position q, velocity qd, e = q_d - q, e_dot and r = e_dot + Lambda e, all (n,)."""

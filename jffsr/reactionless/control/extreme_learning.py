@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.errors import Gains, decoupled_inertia, tracking_errors
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.robots.robot import Robot
@@ -22,7 +23,7 @@ INPUTS = 5
 HIDDEN = 60
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ExtremeLearning:
     """tau = M (K r + h beta + E sign(r)), d beta/dt = mu h r, h = sigmoid(A x + b), for each joint.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.computed_torque import ComputedTorque
 from jffsr.reactionless.control.errors import Gains
 from jffsr.reactionless.estimation.balance import balance_of
@@ -18,7 +18,7 @@ from jffsr.robots.robot import Robot
 from jffsr.types import Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class LearntLoad:
     """`ComputedTorque` of the robot with the load that `model` estimates at the sample: certainty equivalence.

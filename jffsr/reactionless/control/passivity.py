@@ -38,6 +38,7 @@ from jffsr.dynamics.equations_of_motion import body_wrenches
 from jffsr.dynamics.kinematics import Kinematics, kinematics
 from jffsr.dynamics.momentum import generalized_inertia
 from jffsr.dynamics.spatial_tree import inwards, motion_subspace, spatial_inertias
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.errors import Gains, tracking_errors
 from jffsr.reactionless.control.load_inertia import LOAD_PARAMETERS, load_inertias
 from jffsr.reactionless.interface import Desired, Measured
@@ -46,7 +47,7 @@ from jffsr.robots.state import State
 from jffsr.types import Array, Scalar, Twist, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class LoadEstimate:
     """parameters (10,) of the load, theta_hat; bias (n,), constant torques that the joints need beside it, N m or N;
@@ -57,7 +58,7 @@ class LoadEstimate:
     base_acceleration: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PassivityBased:
     """The module's law: the robot without load, a load of unknown inertia on the body of its first end effector.

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
-
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.errors import Gains, decoupled_inertia, tracking_errors
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.robots.robot import Robot
 from jffsr.types import Array, Scalar, Vector
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ProportionalDerivative:
     """tau = M K r with r = e_dot + Lambda e and e = q_d - q: the PD part of Ye, Dong and Hong 2019, equation (47).

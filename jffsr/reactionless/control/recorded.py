@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.interface import Desired, Measured
 from jffsr.trajectories.interface import Trajectory
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class Recorded:
     """Joint position, velocity and acceleration (N, n) at N samples, played in order, the last then held."""

@@ -17,6 +17,7 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.optimizers.driver import Outcome, run
 from jffsr.optimizers.registry import Settings, build_phases
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.control.extreme_learning import HIDDEN, INPUTS, ExtremeLearning, machine_weights
 from jffsr.reactionless.control.recorded import Recorded
 from jffsr.reactionless.plant import closed_loop
@@ -33,7 +34,7 @@ SEARCHES = {
 """The paper's searches and their constants."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class MachineTraining:
     """The problem that a search is given: plants, with what they start from and follow, and the controller to tune.

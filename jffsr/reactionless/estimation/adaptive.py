@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.estimation.balance import balance_of
 from jffsr.reactionless.estimation.models import LoadModel
 from jffsr.reactionless.interface import Desired, Measured
@@ -43,7 +43,7 @@ ADAPTIVE_SENTENCES = {
 _UNABSORBED = 1e-6
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class AdaptiveState:
     """model: the load model's state; joint_position and joint_velocity (n,): what is commanded;
@@ -57,7 +57,7 @@ class AdaptiveState:
     code: Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AdaptiveReactionless:
     """A `Reference`: qd = H# (L + gain H_w e) + r + s (1 - H# H) zeta(t), with the blocks that the model estimates.

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.dynamics.kinematics import end_effector_pose, jacobians, kinematics, system_com
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.interface import Measured
 from jffsr.reactionless.null_space import reaction_blocks
 from jffsr.robots.robot import Robot
@@ -27,7 +27,7 @@ from jffsr.spatial.rotation import quaternion_to_matrix
 from jffsr.types import Array, Matrix, Matrix3, Scalar, Vector, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Balance:
     """The robot without its load at one sample, resolved in B.
@@ -61,7 +61,7 @@ class Balance:
         return jnp.concatenate([jnp.ones(1), self.base_rate, self.joint_velocity])
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Load:
     """A rigid load in the tool frame E: mass (), kg; com (3,), m; inertia (3, 3), kg m^2, about its centre of mass."""

@@ -12,6 +12,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.estimation.balance import Load, balance_of, load_blocks
 from jffsr.reactionless.interface import Measured, Reference
 from jffsr.robots.robot import Robot
@@ -23,7 +24,7 @@ from jffsr.spatial.rotation import (
 from jffsr.types import Array, Quaternion, Scalar, Vector, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class SensorNoise:
     """Standard deviations: base_rate, rad/s; joint_position, rad or m; joint_rate, rad/s or m/s."""
@@ -33,7 +34,7 @@ class SensorNoise:
     joint_rate: Array | float = 0.0
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class LoadHistory:
     """Two loads in the tool frame, the second from time `change`, s, on; angular_momentum (3,), N m s, in I, of
@@ -48,7 +49,7 @@ class LoadHistory:
     angular_momentum: Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class CommandedRun:
     """N samples: time (N,), s; base_rate (N, 3), rad/s, in B, at the end of each sample; base_quaternion (N, 4) there;

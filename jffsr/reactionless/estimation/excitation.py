@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 _GOLDEN = 0.6180339887498949
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class SineSum:
     """zeta_j(t) = amplitude sum_k sin(2 pi f_jk t + phase_jk)/K: frequency and phase (n, K), Hz and rad; amplitude,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.types import Array, Scalar, Vector
 
 
@@ -17,7 +17,7 @@ class Forgetting(Protocol):
     def __call__(self, count: Scalar, innovation: Vector, leverage: Scalar) -> Scalar: ...
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ConstantForgetting:
     """The same factor always; 1 is plain least squares."""
@@ -29,7 +29,7 @@ class ConstantForgetting:
         return jnp.asarray(self.factor, dtype=float)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ClockForgetting:
     """Ye, Dong and Hong 2019: largest - share exp(-rate k) at sample k, a clock that no later change resets."""
@@ -43,7 +43,7 @@ class ClockForgetting:
         return self.largest - self.share * jnp.exp(-self.rate * count)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class InnovationForgetting:
     """Fortescue, Kershenbaum and Ydstie 1981: as much is forgotten as keeps the information's worth constant.

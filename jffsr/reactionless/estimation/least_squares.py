@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.estimation.forgetting import ConstantForgetting, Forgetting
 from jffsr.types import Array, Matrix, Scalar, Vector
 
@@ -23,7 +24,7 @@ INITIAL = 1.4
 """Ye, Dong and Hong 2019: Q(0) = 1.4 E."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Regression:
     """What an estimator knows: weights (p, r); covariance (p, p), per unit of the noise's variance once scaled by it;
@@ -46,7 +47,7 @@ class Estimator(Protocol):
         """Knowing one sample more: regressor (p,), value (r,); fresh (), bool, is false where it was lost."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RecursiveLeastSquares:
     """Recursive least squares with a law of forgetting.
@@ -92,7 +93,7 @@ class RecursiveLeastSquares:
         return jnp.linalg.solve(factor * jnp.eye(q.shape[0]) + share * q, q)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class SlidingWindow:
     """Least squares over the last `length` (static) samples, drawn to the last estimate with the weight of Q(0).

@@ -6,9 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-import jax
 import jax.numpy as jnp
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.estimation.balance import Balance, Load, load_blocks
 from jffsr.reactionless.estimation.least_squares import Estimator, RecursiveLeastSquares, Regression
 from jffsr.types import Array, Matrix, Matrix3, Scalar, Vector3
@@ -27,7 +27,7 @@ class LoadModel(Protocol):
         """H_w (3, 3), H_wphi (3, n), kg m^2, and L (3,), N m s, of robot and load in B, by the estimate."""
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class KnownLoad:
     """A load (in the tool frame) and an angular momentum (3,), N m s, in I, that are known: what others are measured
@@ -54,7 +54,7 @@ class KnownLoad:
         )
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class RegressedLoad:
     """d = W' [1; w_0; qd] by an estimator of least squares, which follows W = [L, -dH_w, -dH_wphi]' as the arm moves.

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.reactionless.estimation.balance import Balance, Load, load_blocks
 from jffsr.reactionless.estimation.least_squares import INITIAL
 from jffsr.reactionless.estimation.pseudo_inertia import (
@@ -30,7 +31,7 @@ from jffsr.types import Array, Matrix, Matrix3, Scalar, Vector, Vector3
 _GUESS = Load(1.0, np.zeros(3), np.diag([0.2, 0.2, 0.2]))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class LoadEstimate:
     """numbers (13,): the ten of the load in E and L in I, N m s; centre (13,): those it is drawn to with the weight
@@ -63,7 +64,7 @@ class LoadEstimate:
         return self.numbers[NUM_PARAMETERS:]
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class LoadParameters:
     """Estimates a load's parameters directly.

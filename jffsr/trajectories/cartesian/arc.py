@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.reading.did_you_mean import hint, listed
 from jffsr.spatial.rotation import quaternion_multiply, rotation_vector_to_quaternion
 from jffsr.spatial.safe import safe_norm
@@ -26,7 +26,7 @@ ATTITUDES = ("fixed", "turning", "to_goal")
 _FLAT = 1e-9  # rad: below, three points count as on one line
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Arc:
     """The start's position carried about an axis by an angle; the attitude turning by a rotation vector meanwhile.

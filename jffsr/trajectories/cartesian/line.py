@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax
-
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.rotation import quaternion_multiply, rotation_vector_to_quaternion
 from jffsr.trajectories.cartesian.poses import GivenPose, checked_pose, shortest_turn
 from jffsr.types import Array, Quaternion, Scalar, Vector3
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Line:
     """Straight from pose to pose, the attitude turning about one axis, fixed in I, by the shortest way.

@@ -17,6 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.bspline import basis
 from jffsr.trajectories.cartesian.cumulative import combined_lengths, partial_pose
 from jffsr.trajectories.cartesian.poses import GivenPose, checked_poses, checked_positive
@@ -27,7 +28,7 @@ from jffsr.types import Array, Quaternion, Scalar, Vector3
 _LEAST_DEGREE = 3  # below, the acceleration jumps on the way
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class PoseSpline:
     """A smooth path from the first of some poses to the last, drawn towards those between or through them.

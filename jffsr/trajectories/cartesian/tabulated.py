@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.checks import checked_duration
 from jffsr.types import Array, Scalar
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Tabulated:
     """The timing that has given rates at given places of the path; C1 in time and never backwards.

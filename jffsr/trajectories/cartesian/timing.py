@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.checks import checked_duration
 from jffsr.types import Array, Scalar
 
 _RAMP = 0.2
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Trapezoid:
     """Trapezoidal velocity law: constant acceleration, constant rate, constant deceleration.
@@ -50,7 +50,7 @@ class Trapezoid:
         return s, rate / self.duration, acceleration / self.duration**2
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Quintic:
     """10 x^3 - 15 x^4 + 6 x^5 of x = t/duration: at both ends at rest and without acceleration.
@@ -74,7 +74,7 @@ class Quintic:
         return s, rate / self.duration, acceleration / self.duration**2
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Uniform:
     """s = t/duration at a constant rate, for a path that has its own timing.

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply
 from jffsr.trajectories.cartesian.interface import Timing, ToolPath, ToolTarget
 from jffsr.trajectories.cartesian.poses import checked_quaternion, checked_vector
@@ -24,7 +25,7 @@ from jffsr.types import Array, Quaternion, Scalar, Vector3
 PoseFunction = Callable[[Scalar], tuple[Vector3, Quaternion]]
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class ToolTrajectory:
     """A tool's path and its timing: pose, twist and acceleration at any time, exact to rounding.
@@ -75,7 +76,7 @@ def path_derivatives(path: ToolPath, s: Scalar) -> tuple[tuple[Vector3, Quaterni
     return (position, q), jnp.concatenate([velocity, turning[0]]), jnp.concatenate([bend, turning[1]])
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class _Function:
     """A plain function as a pytree without numbers."""
@@ -87,7 +88,7 @@ class _Function:
         return jnp.asarray(position), jnp.asarray(q)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class _InTime:
     """A function of time as one of the share of the duration."""

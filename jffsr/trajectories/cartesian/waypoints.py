@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.errors import InputError
+from jffsr.pytrees import register_dataclass
 from jffsr.trajectories.cartesian.cumulative import combined_lengths, partial_pose
 from jffsr.trajectories.cartesian.poses import GivenPose, checked_poses, checked_positive
 from jffsr.types import Array, Quaternion, Scalar, Vector, Vector3
@@ -24,7 +24,7 @@ _ACTIVE = 3  # parts that may be under way at once: one, and one that a corner o
 _SAME = 1e-9
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Waypoints:
     """Poses joined by straight parts, each with a turn about one axis, and corners rounded off; C2 in s.
