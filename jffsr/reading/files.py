@@ -4,11 +4,27 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from jffsr.errors import InputError
 
 MAX_BYTES = 1_000_000
+
+_NOTED: ContextVar[dict[str, bytes] | None] = ContextVar("noted", default=None)
+
+
+@contextmanager
+def what_is_read() -> Iterator[dict[str, bytes]]:
+    """Context that yields a mapping in which each file that is read there appears: absolute path, content."""
+    noted: dict[str, bytes] = {}
+    token = _NOTED.set(noted)
+    try:
+        yield noted
+    finally:
+        _NOTED.reset(token)
 
 
 def read_text(path: Path, shown: str, kind: str = "YAML", most: int = MAX_BYTES) -> str:
@@ -41,4 +57,6 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
         raise InputError(f"{shown!r}: the file cannot be read ({reason.lower()})") from None
     if len(data) > most:
         raise InputError(f"{shown}: the file is larger than {most:,} bytes, the most that is read")
+    if (noted := _NOTED.get()) is not None:
+        noted[os.path.abspath(path)] = data
     return data

@@ -1,7 +1,8 @@
 """The folder of a run: whose it is, whether it is finished, and what goes into it.
 
-config.yaml (resolved), summary.json (written last: its presence says that the run is finished), result.nc,
-metrics.jsonl (a line a chunk), figures/, and, while the run is under way, checkpoint.npz.
+config.yaml (resolved), robot/ (the files of a robot that is not of the catalogue), summary.json (written last: its
+presence says that the run is finished), result.nc, metrics.jsonl (a line a chunk), figures/, and, while the run is
+under way, checkpoint.npz.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from jffsr.errors import InputError
 from jffsr.study.atomic import plain, write_text
 from jffsr.study.config import Study, dump_config, load_config
+from jffsr.study.robot_files import robot_files
 
 
 class RunFolder:
@@ -104,7 +106,9 @@ def claim_run_folder(config: Study, out: str | Path | None) -> RunFolder:
     """
     path = free_name(Path("runs"), config.name) if out is None else Path(out)
     folder = RunFolder(path)
-    text = dump_config(config)
+    carried = robot_files([config.robot])
+    robot = carried.names.get(config.robot, config.robot)
+    text = dump_config(config.model_copy(update={"robot": robot}))
     if path.is_dir() and any(path.iterdir()):
         if not folder.config.is_file():
             raise InputError(f"--out {path}: the folder is not empty and holds no run; give another")
@@ -113,10 +117,11 @@ def claim_run_folder(config: Study, out: str | Path | None) -> RunFolder:
                 f"--out {path}: the folder holds a run of another configuration; give another folder, or repeat it "
                 f"with 'jffsr run {folder.config}'"
             )
-        return folder
     try:
         path.mkdir(parents=True, exist_ok=True)
-        write_text(folder.config, text)
+        if not folder.config.is_file():
+            write_text(folder.config, text)
+        carried.write(path)
     except OSError as error:
         raise InputError(f"--out {path}: cannot be written ({error.strerror or error})") from None
     return folder

@@ -1,7 +1,7 @@
 """The folder of a sweep.
 
-config.yaml (enough to repeat it), parts/ (finished results, see `parts`), and at the end sweep.nc, table.md, figures/
-and summary.json, whose presence says that the sweep is finished.
+config.yaml and robot/ (enough to repeat it), parts/ (finished results, see `parts`), and at the end sweep.nc, table.md,
+figures/ and summary.json, whose presence says that the sweep is finished.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 
 from jffsr.errors import InputError
 from jffsr.study.atomic import write_text
+from jffsr.study.robot_files import robot_files
 from jffsr.study.run_folder import free_name
 from jffsr.study.sweep.specification import Specification
 
@@ -78,7 +79,8 @@ def claim_sweep_folder(spec: Specification, out: str | Path | None) -> SweepFold
     InputError where `out` belongs to something else, or cannot be written.
     """
     folder = SweepFolder(free_name(Path("runs"), spec.name) if out is None else Path(out))
-    path, text = folder.path, spec.to_yaml()
+    carried = robot_files(spec.robots)
+    path, text = folder.path, spec.to_yaml(carried.names)
     # A kill while the configuration is written leaves nothing but hidden files.
     if path.is_dir() and any(not item.name.startswith(".") for item in path.iterdir()):
         if not folder.config.is_file():
@@ -92,6 +94,7 @@ def claim_sweep_folder(spec: Specification, out: str | Path | None) -> SweepFold
         path.mkdir(parents=True, exist_ok=True)
         if not folder.config.is_file():
             write_text(folder.config, text)
+        carried.write(path)
         folder.parts.mkdir(exist_ok=True)
     except OSError as error:
         raise InputError(f"--out {path}: cannot be written ({error.strerror or error})") from None

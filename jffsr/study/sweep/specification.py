@@ -7,7 +7,7 @@ A sweep's points are every combination of one entry of `list`, one of the `rando
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -48,15 +48,37 @@ class Specification:
     grid: dict[str, tuple[Document, ...]] = field(default_factory=dict)
     seeds: tuple[int, ...] = ()
 
-    def to_yaml(self) -> str:
-        """The sweep with its base inside, from which it can be repeated elsewhere."""
-        values: dict[str, Any] = {"kind": SWEEP, "name": self.name, "base": {"name": self.stem, **self.base}}
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that the sweep names, each as a catalogue's name or an absolute path."""
+        documents = (
+            *self.fixed,
+            *self.grid.get("robot", ()),
+            *(item for entry in self.listed for item in entry),
+        )
+        named = [document.value[1] for document in documents if document.value[0] == "robot"]
+        return tuple(robot for robot in [self.base.get("robot"), *named] if isinstance(robot, str))
+
+    def to_yaml(self, robots: Mapping[str, str] | None = None) -> str:
+        """The sweep with its base inside, from which it can be repeated; robots gives other names to some of them."""
+
+        def named(key: str, value: Any) -> Any:
+            is_robot = key == "robot" and isinstance(value, str)
+            return (robots or {}).get(value, value) if is_robot else value
+
+        base = {key: named(key, value) for key, value in self.base.items()}
+        values: dict[str, Any] = {"kind": SWEEP, "name": self.name, "base": {"name": self.stem, **base}}
         if self.fixed:
-            values["set"] = dict(document.value for document in self.fixed)
+            values["set"] = {key: named(key, value) for key, value in (item.value for item in self.fixed)}
         if self.grid:
-            values["grid"] = {key: [item.value[1] for item in items] for key, items in self.grid.items()}
+            values["grid"] = {
+                key: [named(key, item.value[1]) for item in items] for key, items in self.grid.items()
+            }
         if self.listed:
-            values["list"] = [dict(document.value for document in entry) for entry in self.listed]
+            values["list"] = [
+                {key: named(key, value) for key, value in (item.value for item in entry)}
+                for entry in self.listed
+            ]
         if self.draws is not None:
             values["random"] = self.draws.values
         if self.seeds:
