@@ -48,4 +48,6 @@ class Section(BaseModel):
 
 
 def _radians(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _radians(v) for key, v in value.items()}
     return tuple(_radians(v) for v in value) if isinstance(value, tuple) else math.radians(value)

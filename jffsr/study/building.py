@@ -63,10 +63,12 @@ def build_robot(config: RobotStudy) -> Robot:
         robot = load_robot(config.robot)
     except InputError as error:
         raise InputError(f"{config.where('robot')}: {error}") from None
-    limits, n = robot.limits, robot.num_joints
-    position = config.per_joint("position", n)
-    rate, acceleration = config.per_joint("rate", n), config.per_joint("acceleration", n)
-    torque = config.per_joint("torque", n)
+    limits, names = robot.limits, robot.joint_names
+    own = list(zip(limits.position_lower, limits.position_upper, strict=True))
+    position = config.per_joint("position", names, own)
+    rate = config.per_joint("rate", names, limits.velocity)
+    acceleration = config.per_joint("acceleration", names, limits.acceleration)
+    torque = config.per_joint("torque", names, limits.torque)
     changes = {}
     if position is not None:
         changes["position_lower"] = np.array([low for low, _ in position])

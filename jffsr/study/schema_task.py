@@ -46,16 +46,31 @@ def _increasing(value: tuple[float, float]) -> tuple[float, float]:
 
 
 Pair = Annotated[tuple[Number, Number], BeforeValidator(_ordered_pair), AfterValidator(_increasing)]
-Range = either(
-    Annotated[float, number(gt=0, instead=" (x for [-x, x]) or a list of one pair [low, high] per joint")],
-    Annotated[tuple[Pair, ...], sequence(f"a list of 1 to {MAX_JOINTS} pairs [low, high]", 1, MAX_JOINTS)],
-    _is_list,
+
+
+def _per_joint(one: Any, each: Any, of: str) -> Any:
+    """One for all joints, a list with one for each, or a mapping from some joints' names."""
+    listed = Annotated[tuple[each, ...], sequence(f"a list of 1 to {MAX_JOINTS} {of}", 1, MAX_JOINTS)]
+    several = either(listed, dict[str, each], lambda value: isinstance(value, dict))
+    return either(one, several, lambda value: isinstance(value, dict) or _is_list(value))
+
+
+Range = _per_joint(
+    Annotated[
+        float,
+        number(
+            gt=0,
+            instead=" (x for [-x, x]), a list of one pair [low, high] per joint or {joint: [low, high], ...}",
+        ),
+    ],
+    Pair,
+    "pairs [low, high]",
 )
 Positive = Annotated[float, number(gt=0)]
-Bound = either(
-    Annotated[float, number(gt=0, instead=" or a list with one per joint")],
-    Annotated[tuple[Positive, ...], sequence(f"a list of 1 to {MAX_JOINTS} numbers > 0", 1, MAX_JOINTS)],
-    _is_list,
+Bound = _per_joint(
+    Annotated[float, number(gt=0, instead=", a list with one per joint or {joint: number, ...}")],
+    Positive,
+    "numbers > 0",
 )
 Excursion = either(
     Annotated[float, number(gt=0, instead=", a list of 3 (one per axis) or null")],
@@ -68,7 +83,10 @@ Joints = Annotated[
 
 
 class MotionLimits(Section):
-    """Limits of the joints that replace the robot's own; a limit that is not given is left as the robot has it."""
+    """Limits of the joints that replace the robot's own; a limit that is not given is left as the robot has it.
+
+    A mapping from joints' names replaces those joints' limits alone.
+    """
 
     units: ClassVar = ("position", "rate", "acceleration")
 
@@ -85,19 +103,19 @@ class MotionLimits(Section):
         return self
 
     @property
-    def position_si(self) -> tuple[float, float] | tuple[tuple[float, float], ...] | None:
-        """One (low, high) for all joints, or one per joint, rad or m; None: the robot's own."""
+    def position_si(self) -> tuple | dict[str, tuple[float, float]] | None:
+        """One (low, high) for all joints, one per joint, or some by name, rad or m; None: the robot's own."""
         value = self.si("position")
         return (-value, value) if isinstance(value, float) else value
 
     @property
-    def rate_si(self) -> float | tuple[float, ...] | None:
-        """One for all joints, or one per joint, rad/s or m/s; None: the robot's own."""
+    def rate_si(self) -> float | tuple[float, ...] | dict[str, float] | None:
+        """One for all joints, one per joint, or some by name, rad/s or m/s; None: the robot's own."""
         return self.si("rate")
 
     @property
-    def acceleration_si(self) -> float | tuple[float, ...] | None:
-        """One for all joints, or one per joint, rad/s^2 or m/s^2; None: the robot's own."""
+    def acceleration_si(self) -> float | tuple[float, ...] | dict[str, float] | None:
+        """One for all joints, one per joint, or some by name, rad/s^2 or m/s^2; None: the robot's own."""
         return self.si("acceleration")
 
     @property
@@ -116,8 +134,8 @@ class Limits(MotionLimits):
     base_excursion: Excursion | None = None
 
     @property
-    def torque_si(self) -> float | tuple[float, ...] | None:
-        """One for all joints, or one per joint, N m or N; None: the robot's own."""
+    def torque_si(self) -> float | tuple[float, ...] | dict[str, float] | None:
+        """One for all joints, one per joint, or some by name, N m or N; None: the robot's own."""
         return self.torque
 
     @property

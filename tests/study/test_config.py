@@ -6,14 +6,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture acts by being here)
 
 from jffsr.errors import InputError
+from jffsr.robots.loading import load_robot
+from jffsr.study.building import build_robot
 from jffsr.study.config import dump_config, load_config
 from jffsr.study.schema import PlanningConfig
 
 ROOT = Path(__file__).resolve().parents[2]
+JOINTS, OWN = ("shoulder", "elbow"), (1.0, 1.0)
 SHIPPED = sorted((ROOT / "configs" / "planning").glob("*.yaml"))
 
 
@@ -37,20 +41,70 @@ def test_degrees_become_radians_and_radians_stay():
     config = load(GOOD + "limits: {position_deg: 180, rate: 0.25, acceleration_deg: [9, 18]}\n")
     assert config.task.start_si == (0.0, math.pi / 2)
     assert config.limits.position_si == (-math.pi, math.pi)
-    assert config.per_joint("rate", 2) == (0.25, 0.25)
-    assert config.per_joint("acceleration", 2) == (math.radians(9), math.radians(18))
-    assert config.per_joint("position", 2) == ((-math.pi, math.pi),) * 2
+    assert config.per_joint("rate", JOINTS, OWN) == (0.25, 0.25)
+    assert config.per_joint("acceleration", JOINTS, OWN) == (math.radians(9), math.radians(18))
+    assert config.per_joint("position", JOINTS, OWN) == ((-math.pi, math.pi),) * 2
     pairs = load(GOOD + "limits: {position: [[-1, 2], [0, 1e-3]], base_excursion_deg: 10}\n")
-    assert pairs.per_joint("position", 2) == ((-1.0, 2.0), (0.0, 0.001))
+    assert pairs.per_joint("position", JOINTS, OWN) == ((-1.0, 2.0), (0.0, 0.001))
     assert pairs.limits.base_excursion_si == (math.radians(10),) * 3
-    assert pairs.per_joint("rate", 2) is None
+    assert pairs.per_joint("rate", JOINTS, OWN) is None
 
 
 def test_a_limit_for_another_number_of_joints_is_refused_with_its_line():
     config = load(GOOD + "limits:\n  rate_deg: [1, 2]\n")
     with pytest.raises(InputError) as caught:
-        config.per_joint("rate", 6)
-    assert str(caught.value) == "x.yaml:8: limits.rate_deg: found a list of 2, the robot has 6 joints"
+        config.per_joint("rate", ["j1", "j2", "j3"], [1.0] * 3)
+    assert str(caught.value) == "x.yaml:8: limits.rate_deg: found a list of 2, the robot has 3 joints"
+
+
+def test_limits_of_some_joints_are_given_by_name():
+    """The others keep the robot's; what is read back from the folder is the same."""
+    text = (
+        GOOD
+        + "limits:\n  position_deg: {elbow: [-90, 180]}\n  rate_deg:\n    elbow: 9\n  torque: {shoulder: 3}\n"
+    )
+    config = load(text)
+    own = [(-1.0, 1.0), (-np.inf, np.inf)]
+    assert config.per_joint("position", JOINTS, own) == ((-1.0, 1.0), (-math.pi / 2, math.pi))
+    assert config.per_joint("rate", JOINTS, [0.3, np.inf]) == (0.3, math.radians(9))
+    assert config.per_joint("torque", JOINTS, [1.0, 2.0]) == (3.0, 2.0)
+    assert load(dump_config(config)) == config
+    robot = build_robot(load(GOOD + "limits: {rate: {joint2: 0.1}}\n", "robot=hu_planar2"))
+    assert robot.limits.velocity[1] == 0.1
+    assert robot.limits.velocity[0] == load_robot("hu_planar2").limits.velocity[0]
+
+
+@pytest.mark.parametrize(
+    ("limits", "told"),
+    [
+        ("{rate: {elbo: 1}}", "limits.rate.elbo: the robot has no such joint; did you mean 'elbow'?"),
+        (
+            "{rate: {wheel: 1}}",
+            "limits.rate.wheel: the robot has no such joint; the joints are shoulder, elbow",
+        ),
+    ],
+)
+def test_a_limit_of_a_joint_that_is_none_is_refused_with_its_line(limits, told):
+    config = load(GOOD + f"limits: {limits}\n")
+    with pytest.raises(InputError) as caught:
+        config.per_joint("rate", JOINTS, OWN)
+    assert str(caught.value) == f"x.yaml:7: {told}"
+
+
+@pytest.mark.parametrize(
+    ("limits", "told"),
+    [
+        ("{rate: {elbow: -1}}", "limits.rate.elbow: found -1, a number > 0 is expected"),
+        (
+            "{position_deg: {elbow: 90}}",
+            "limits.position_deg.elbow: found 90, a pair [low, high] for each joint is expected",
+        ),
+    ],
+)
+def test_a_limit_by_name_is_checked_like_any(limits, told):
+    with pytest.raises(InputError) as caught:
+        load(GOOD + f"limits: {limits}\n")
+    assert str(caught.value) == f"x.yaml:7: {told}"
 
 
 def test_duration_is_given_or_free():

@@ -22,7 +22,7 @@ def message(text, *overrides):
 
 # --- bad input: what is added to a good file, and the sentence ---
 
-RATE = "a number > 0 or a list with one per joint is expected"
+RATE = "a number > 0, a list with one per joint or {joint: number, ...} is expected"
 SEED = "a whole number in [0, 4294967295] is expected"
 KINDS = listed(f"'{kind}'" for kind in OPTIMIZERS)
 SWARMS = listed(f"'{kind}'" for kind in GENERATIONAL)

@@ -114,7 +114,8 @@ REFUSED = {
     "degree (9) are expected",
     "trajectory: {kind: b_spline}\n": "x.yaml:7: trajectory.kind: found 'b_spline', 'sine_polynomial', "
     "'polynomial' or 'bspline' is expected; did you mean 'bspline'?",
-    "limits: {torque: 0}\n": "x.yaml:7: limits.torque: found 0, a number > 0 or a list with one per joint is expected",
+    "limits: {torque: 0}\n": "x.yaml:7: limits.torque: found 0, a number > 0, a list "
+    "with one per joint or {joint: number, ...} is expected",
     "objective: {torque_integral: {enable: true}}\n": "x.yaml:7: objective.torque_integral.enable: unknown key; "
     "did you mean 'enabled'?",
 }
