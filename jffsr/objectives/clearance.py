@@ -13,6 +13,8 @@ import numpy as np
 
 from jffsr.clearance.along_motion import clearances
 from jffsr.clearance.model import ClearanceModel
+from jffsr.clearance.reports import NearestApproach, nearest_approach
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.motion import Motion
 from jffsr.spatial.safe import smooth_max
@@ -28,7 +30,7 @@ class _Poses(NamedTuple):
     joint_position: Array
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """Every pair of bodies of `model` stays `margin`, m, apart at all samples of the motion.
@@ -59,15 +61,21 @@ class Clearance:
 
     def inequality(self, robot: Robot, motion: Motion) -> Array:
         """How far each pair comes within the margin, (p,), per 0.1 m."""
-        states = self.target
-        if callable(states):
-            states = jax.vmap(states)(motion.time + self.begin)
+        states = self._target_states(motion)
         poses = _Poses(motion.base_position, motion.base_quaternion, motion.joint_position)
         if self.windows is not None:
             nearest = self._nearest(robot, poses, states)
             poses, states = jax.tree.map(lambda x: jnp.asarray(x)[nearest], (poses, states))
         distances = clearances(self.model, robot, poses, states)
         return (jnp.asarray(self.margin) + smooth_max(-jnp.asarray(distances), self.width, axis=1)) / MISS
+
+    def nearest(self, robot: Robot, motion: Motion) -> NearestApproach:
+        """Which pair comes nearest in a motion that is known, how near and when; host only."""
+        return nearest_approach(self.model, robot, motion, self._target_states(motion))
+
+    def _target_states(self, motion: Motion) -> Any:
+        states = self.target
+        return jax.vmap(states)(motion.time + self.begin) if callable(states) else states
 
     def _nearest(self, robot: Robot, poses: _Poses, states: Any) -> Array:
         """The sample of each window, (windows,), at which the nearest pair is nearest."""

@@ -2,6 +2,7 @@
 
 A term has a `name`, a `scale` (the paper's k: the weighted term is value / scale), `value(robot, motion)`, the
 published form, and `smooth(robot, motion, smoothing)`, which is differentiable everywhere and tends to it.
+Its `unit`, where it has one, is that of its value; without it a value is a ratio.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-import jax
 import jax.numpy as jnp
 
 from jffsr.dynamics.kinematics import end_effector_pose, kinematics, system_com
@@ -21,6 +21,7 @@ from jffsr.objectives.smoothing import (
     smooth_error_norm,
     smooth_overrun,
 )
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.rollouts.motion import Motion
@@ -73,7 +74,7 @@ def _smooth_attitude_angles(motion: Motion, measure: str, width: Scalar) -> Arra
     return rounded_rotation_vector(_relative_to_start(motion), width)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AttitudeChange:
     """Norm, rad, of the base's attitude change from start to end: |dPhi_s|, eq. (38)."""
@@ -81,6 +82,7 @@ class AttitudeChange:
     scale: Array
     measure: str = field(default=ROTATION_VECTOR, metadata={"static": True})
     name: str = field(default="attitude_change", metadata={"static": True})
+    unit = "rad"
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
         """The published form."""
@@ -93,7 +95,7 @@ class AttitudeChange:
         return smooth_error_norm(angles[-1], self.scale, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointPosition:
     """Sum over joints of the overrun of [lower, upper], (n,) each, relative to half that range: eq. (39)'s form.
@@ -128,7 +130,7 @@ class JointPosition:
         return jnp.sum(smooth_hinge(largest, smoothing.overrun))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointRate:
     """Sum over joints of the relative overrun of the peak rate over `limit` (n,), eq. (39)."""
@@ -146,7 +148,7 @@ class JointRate:
         return smooth_overrun(motion.joint_grid.joint_velocity, self.limit, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointAcceleration:
     """Sum over joints of the relative overrun of the peak acceleration over `limit` (n,), eq. (39)."""
@@ -164,7 +166,7 @@ class JointAcceleration:
         return smooth_overrun(motion.joint_grid.joint_acceleration, self.limit, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AttitudeExcursion:
     """Sum over axes of the relative overrun of the base's peak attitude angle over `limit` (3,), eq. (41)."""
@@ -184,7 +186,7 @@ class AttitudeExcursion:
         return smooth_overrun(angles, self.limit, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class GoalAttitude:
     """Norm of the vector part of q_final^-1 q_goal, sin(angle/2): |dq|, eq. (42).
@@ -209,7 +211,7 @@ class GoalAttitude:
         return smooth_error_norm(self._error(motion), self.scale, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class ToolPosition:
     """Distance, m, of the tool at the end from its goal: |dp_e|, eq. (42).
@@ -223,6 +225,7 @@ class ToolPosition:
     attitude: Quaternion
     end_effector: str | None = field(default=None, metadata={"static": True})
     name: str = field(default="tool_position", metadata={"static": True})
+    unit = "m"
 
     def _error(self, robot: Robot, motion: Motion) -> Array:
         from_com = []
@@ -245,7 +248,7 @@ class ToolPosition:
         return smooth_error_norm(self._error(robot, motion), self.scale, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class UserTerm:
     """A user's own `function(robot, motion) -> scalar`, taken as it is in both forms."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jffsr.objectives.smoothing import Smoothing, overrun, smooth_overrun
+from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import Robot
 from jffsr.rollouts.joint_torque import with_joint_torque
 from jffsr.rollouts.motion import Motion
@@ -59,13 +59,14 @@ def _width(term_scale: Array, smoothing: Smoothing, motion: Motion) -> Scalar:
     return smoothing.norm * term_scale / spread
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class TorqueIntegral:
     """Integral, N m s, of the sum over joints of |torque|: Hu, Wang and Shi 2011, eq. (7)."""
 
     scale: Array
     name: str = field(default="torque_integral", metadata={"static": True})
+    unit = "N m s"
     needs_torque = True
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
@@ -78,13 +79,14 @@ class TorqueIntegral:
         return integral(motion, jnp.sum(rounded, axis=-1))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class TorqueEnergy:
     """Integral, N^2 m^2 s, of the sum over joints of torque^2: what resistance turns to heat, but for a factor."""
 
     scale: Array
     name: str = field(default="torque_energy", metadata={"static": True})
+    unit = "N^2 m^2 s"
     needs_torque = True
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
@@ -96,13 +98,14 @@ class TorqueEnergy:
         return self.value(robot, motion)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class MechanicalWork:
     """Integral, J, of the sum over joints of |torque x rate|: the work of drives that do not take energy back."""
 
     scale: Array
     name: str = field(default="mechanical_work", metadata={"static": True})
+    unit = "J"
     needs_torque = True
 
     def _power(self, robot: Robot, motion: Motion) -> Array:
@@ -118,13 +121,14 @@ class MechanicalWork:
         return integral(motion, jnp.sum(smooth_norm(self._power(robot, motion)[..., None], width), axis=-1))
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class PeakTorque:
     """Largest |torque|, N m or N, of any joint at any sample."""
 
     scale: Array
     name: str = field(default="peak_torque", metadata={"static": True})
+    unit = "N m"
     needs_torque = True
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
@@ -137,7 +141,7 @@ class PeakTorque:
         return smooth_max(jnp.concatenate([torque, -torque]), smoothing.peak * self.scale)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class JointTorque:
     """Sum over joints of the relative overrun of the peak torque over `limit` (n,), in the form of Li's eq. (39)."""
@@ -156,7 +160,7 @@ class JointTorque:
         return smooth_overrun(_torque(robot, motion), self.limit, smoothing)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class AttitudePenalty:
     """Squared angle, rad^2, between the base's final attitude and `goal`: |theta(T) - theta_des|^2 of Hu's eq. (9).
@@ -168,6 +172,7 @@ class AttitudePenalty:
     scale: Array
     goal: Quaternion
     name: str = field(default="attitude_penalty", metadata={"static": True})
+    unit = "rad^2"
 
     def _error(self, motion: Motion) -> Quaternion:
         final = motion.base_quaternion[-1]
@@ -182,7 +187,7 @@ class AttitudePenalty:
         return jnp.sum(rounded_rotation_vector(self._error(motion), smoothing.peak) ** 2)
 
 
-@jax.tree_util.register_dataclass
+@register_dataclass
 @dataclass(frozen=True)
 class TorqueLimit:
     """Constraint: no joint's torque exceeds `limit` (n,), N m or N, infinite where there is none."""

@@ -138,7 +138,7 @@ def solve(
             code = _judged(problem, verified[2], np.array(_at_its_end(outcome)), tolerances)
             motion, terms, verification, trajectory = jax.device_get(verified)
             derivatives = sensitivity(problem, free) if with_sensitivity else None
-    result = explain(int(code), problem, verification, tolerances)
+    result = explain(int(code), problem, verification, tolerances, motion)
     return Plan(
         problem=problem,
         result=result,

@@ -9,9 +9,11 @@ from enum import IntEnum
 import jax.numpy as jnp
 import numpy as np
 
+from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
+from jffsr.rollouts.motion import Motion
 from jffsr.types import Array
 
 LIMIT_KINDS = ("position", "rate", "acceleration", "excursion", "torque")
@@ -91,15 +93,21 @@ def stands_still(earlier: Array | float, last: Array | float) -> Array | bool:
     return (abs(earlier) < np.inf) & (earlier <= last + 0.01 * abs(earlier))
 
 
-def explain(code: int, problem: Problem, verification: Verification, tolerances: Tolerances) -> Result:
-    """The sentence of advice that goes with a code; host only."""
+def explain(
+    code: int,
+    problem: Problem,
+    verification: Verification,
+    tolerances: Tolerances,
+    motion: Motion | None = None,
+) -> Result:
+    """The sentence of advice that goes with a code; host only. With the motion it names bodies that come too near."""
     code = ResultCode(int(code))
     cost = float(np.maximum(verification.cost, verification.measure))
     accuracy, index = float(problem.objective.accuracy), "J"
     if problem.uncertainty is not None:
         index = f"J over {len(problem.uncertainty.robots.mass)} robots"
     broken = list(violations(problem, verification.overruns, tolerances))
-    missed = ", ".join(constraints_missed(problem, verification))
+    missed = ", ".join(constraints_missed(problem, verification, motion))
     also = f"; limits violated: {', '.join(broken)}" if broken else "; every limit is kept"
     binding = _binding(verification)
     if code is ResultCode.ACCURACY_MET:
@@ -153,12 +161,18 @@ def _unverified(verification: Verification, tolerances: Tolerances) -> Iterator[
             yield f"{what.replace('_', ' ')} of {value:.3g}{unit} (allowed {allowed:g})"
 
 
-def constraints_missed(problem: Problem, verification: Verification) -> Iterator[str]:
-    """Each constraint that the finer run misses by more than its tolerance, and by how much."""
+def constraints_missed(
+    problem: Problem, verification: Verification, motion: Motion | None = None
+) -> Iterator[str]:
+    """Each constraint that the finer run misses by more than its tolerance, and by how much; of a motion also where."""
     for constraint in problem.constraints:
         missed, allowed = float(verification.violations[constraint.name]), float(tolerance_of(constraint))
         if not missed <= allowed:
-            yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g})"
+            if motion is not None and isinstance(constraint, Clearance):
+                margin = float(np.asarray(constraint.margin))
+                yield f"{constraint.name} ({constraint.nearest(problem.robot, motion)}; the margin is {margin:g} m)"
+            else:
+                yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g})"
 
 
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:

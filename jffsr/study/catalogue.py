@@ -49,7 +49,18 @@ def robot_text(name: str, width: int | None = None) -> str:
     ):
         if text:
             lines += wrap(f"{title}: {text}", width, subsequent_indent="  ", break_on_hyphens=False)
-    lines += ["", *_bodies(robot), "", *_joints(robot)]
+    lines += ["", *_bodies(robot)]
+    links = [link.name for link in description.links]
+    lumped = [link for link in links if link not in robot.body_names]
+    if lumped:
+        lines += wrap(
+            f"lumped into the body that they are fixed to: {', '.join(lumped)}", width, subsequent_indent="  "
+        )
+    com = ", ".join(f"{x:.4g}" for x in -np.asarray(robot.root_position) + 0.0)
+    lines += wrap(
+        f"base frame B: at the base's centre of mass, ({com}) m in link '{links[0]}', along its axes", width
+    )
+    lines += ["", *_joints(robot)]
     lines += wrap(
         "ranges, rates and accelerations in degrees (prismatic: m), torques in N m; inf: none given", width
     )
@@ -65,6 +76,7 @@ def _bodies(robot: Robot) -> list[str]:
         kinds = Counter(shape.kind for shape in robot.geometry.on_body(body))
         shapes = ", ".join(kind if count == 1 else f"{count} {kind}" for kind, count in kinds.items())
         lines.append(f"{body:<{column}}{float(mass):>10.6g}   {moments:<34}{shapes or 'none'}")
+    lines.append(f"{'in all':<{column}}{float(np.sum(robot.mass)):>10.6g}")
     return lines
 
 

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import LIMIT_KINDS, violations
+from jffsr.rollouts.motion import Motion
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
@@ -19,7 +21,11 @@ _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
 
 def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]:
     """The summary of a plan, plain data; arrays and numbers that are not finite are left to the writer."""
-    verification = plan.verification
+    verification, problem = plan.verification, plan.problem
+    units = {term.name: getattr(term, "unit", "") for term in problem.objective.terms}
+    clearance = [
+        one.nearest(problem.robot, plan.motion) for one in problem.constraints if isinstance(one, Clearance)
+    ]
     first = plan.first_at(float(plan.problem.objective.accuracy))
     return {
         "kind": "planning",
@@ -32,9 +38,14 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
         },
         "cost": plan.cost,
         "terms": {
-            key: {"value": float(term.value), "weighted": float(term.weighted)}
+            key: {"value": float(term.value), "unit": units[key], "weighted": float(term.weighted)}
             for key, term in plan.terms.items()
         },
+        "base": _base(plan.motion),
+        "nearest_approach": [
+            {"bodies": found.pair, "distance_m": found.distance, "time_s": found.time, "sentence": str(found)}
+            for found in clearance
+        ],
         "duration": float(np.asarray(plan.trajectory.duration)),
         "evaluations": {"objective": plan.evaluations, "gradient": plan.gradient_evaluations},
         "evaluations_to_accuracy": None
@@ -70,6 +81,20 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
     }
 
 
+def _base(motion: Motion) -> dict[str, float]:
+    """How far the base is turned from its start, and how far its centre of mass has moved."""
+    start, q = np.asarray(motion.base_quaternion)[0], np.asarray(motion.base_quaternion)
+    # Of two unit quaternions: their difference and sum are twice the sine and cosine of a quarter of the turn.
+    apart, along = (np.linalg.norm(part, axis=-1) for part in (q - start, q + start))
+    turn = 4 * np.arctan2(np.minimum(apart, along), np.maximum(apart, along))
+    moved = np.linalg.norm(np.asarray(motion.base_position) - np.asarray(motion.base_position)[0], axis=-1)
+    return {
+        "final_turn_rad": float(turn[-1]),
+        "largest_turn_rad": float(np.max(turn)),
+        "largest_displacement_m": float(np.max(moved)),
+    }
+
+
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that a result depends on."""
     found = {"python": platform.python_version()}
@@ -84,15 +109,23 @@ def versions() -> dict[str, str]:
 def summary_text(summary: dict[str, Any]) -> str:
     """A summary for the terminal."""
     lines = [f"{summary['name']}: {summary['result']['sentence']}", ""]
-    lines.append(f"  {'term':<22}{'value':>14}{'weighted':>12}")
-    for key, term in summary["terms"].items():
-        lines.append(f"  {key:<22}{_number(term['value']):>14}{_number(term['weighted']):>12}")
-    lines.append(f"  {'index J':<22}{'':>14}{_number(summary['cost']):>12}")
-    counts, reached = summary["evaluations"], summary["evaluations_to_accuracy"]
-    lines += ["", f"  evaluations   {counts['objective']} of the objective, {counts['gradient']} gradients"]
-    if reached is not None:
-        lines.append(f"  J reached 'met' after {reached['objective']} and {reached['gradient']}")
     check = summary["verification"]
+    finer = {key: term["weighted"] for key, term in check["terms_finer"].items()}
+    lines.append(f"  {'term':<22}{'value':>12} {'':<10}{'weighted':>12}{'finer re-run':>14}")
+    for key, term in summary["terms"].items():
+        value, weighted = _number(term["value"]), _number(term["weighted"])
+        again = _number(finer[key]) if key in finer else ""
+        lines.append(f"  {key:<22}{value:>12} {term.get('unit', ''):<10}{weighted:>12}{again:>14}")
+    found = _number(check["cost_finer"])
+    lines.append(f"  {'index J':<22}{'':>12} {'':<10}{_number(summary['cost']):>12}{found:>14}")
+    lines += ["", *_motion_lines(summary)]
+    counts, reached = summary["evaluations"], summary["evaluations_to_accuracy"]
+    lines += [f"  evaluations   {counts['objective']} of the objective, {counts['gradient']} gradients"]
+    if reached is not None:
+        lines.append(
+            f"                J was small enough after {reached['objective']} of the objective and "
+            f"{reached['gradient']} gradients"
+        )
     lines.append(
         f"  finer re-run  attitude {_number(check['attitude_difference_rad'])} rad, "
         f"position {_number(check['position_difference_m'])} m, "
@@ -106,6 +139,24 @@ def summary_text(summary: dict[str, Any]) -> str:
     return "\n".join(lines + last_lines(summary))
 
 
+def _motion_lines(summary: dict[str, Any]) -> list[str]:
+    """What the base does, and how near bodies come."""
+    base, lines = summary.get("base"), []
+    if base is not None:
+        final, most = (_degrees(base[key]) for key in ("final_turn_rad", "largest_turn_rad"))
+        moved = _number(base["largest_displacement_m"])
+        lines.append(
+            f"  base          turned by {final} at the end, {most} at most; moved by {moved} m at most"
+        )
+    near = summary.get("nearest_approach")
+    if near is not None:
+        told = [found["sentence"] for found in near] or [
+            "not looked at; the key constraints.clearance asks for it"
+        ]
+        lines += [f"  clearance     {sentence}" for sentence in told]
+    return lines
+
+
 def last_lines(summary: dict[str, Any]) -> list[str]:
     """What the simulators said, where they were asked, and how long it took: of studies of any kind."""
     crosscheck, seconds = summary["verification"].get("mujoco"), summary["seconds"]
@@ -114,6 +165,10 @@ def last_lines(summary: dict[str, Any]) -> list[str]:
         *lines,
         f"  seconds       {seconds['total']:.1f} in all, {seconds['compile']:.1f} of them compiling",
     ]
+
+
+def _degrees(value: float | None) -> str:
+    return "not finite" if value is None else f"{np.rad2deg(value):.4g} deg"
 
 
 def _number(value: float | None) -> str:

@@ -189,7 +189,9 @@ def test_refusals(scene, robots):
         ClearanceModel.create(robot, ignore=[("link8", "base")])
     with pytest.raises(InputError, match="arm is 'capsule'; allowed are capsules, exact"):
         ClearanceModel.create(robot, arm="capsule")
-    with pytest.raises(InputError, match="no two bodies with shapes that can meet"):
+    with pytest.raises(
+        InputError, match=r"no two bodies .* that can meet; shapes .* are missing on base, link1, "
+    ):
         ClearanceModel.create(replace(robot, geometry=Geometry()))
     with pytest.raises(InputError, match="the target has no shape with the role 'collision'"):
         ClearanceModel.create(robot, Geometry((replace(BUS.shapes[0], roles=("visual",)),)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +11,9 @@ import numpy as np
 import pytest
 from wu6_problems import limited, wu6_problem
 
+from jffsr.clearance.along_motion import clearances
+from jffsr.clearance.model import ClearanceModel
+from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.composite import TermValue
 from jffsr.planning.result import ResultCode, Tolerances, explain, result_code
 from jffsr.planning.verification import Overruns, Verification
@@ -109,6 +113,32 @@ def test_not_finite(problem, cost):
     result = judged(problem, verification(cost=cost, attitude_difference=np.nan))
     assert result.code is ResultCode.NOT_FINITE
     assert "no finite index" in result.sentence
+
+
+class Samples(NamedTuple):
+    time: np.ndarray
+    base_position: np.ndarray
+    base_quaternion: np.ndarray
+    joint_position: np.ndarray
+
+
+def test_bodies_that_come_too_near_are_named_with_the_time(robots, problem):
+    """The posture that comes nearest is the one of 6 s; without the motion the amount alone is known."""
+    robot = robots["servicer_7dof"]
+    model, joints = ClearanceModel.create(robot), np.random.default_rng(3).uniform(-2, 2, (7, 7))
+    motion = Samples(np.linspace(0, 12, 7), np.zeros((7, 3)), np.tile([1.0, 0, 0, 0], (7, 1)), joints)
+    least = clearances(model, robot, motion).min(axis=0)
+    motion = motion._replace(joint_position=np.roll(joints, 3 - np.argmin(least), axis=0))
+    constraint = Clearance(model, np.array(0.05))
+    held = replace(problem, robot=robot, constraints=(constraint,))
+    seven = {kind: np.full(7, -0.5) for kind in ("position", "rate", "acceleration", "torque")}
+    checked = verification(overruns=overrun(**seven), violations={"clearance": np.array(0.3)})
+    found = explain(ResultCode.CONSTRAINTS_VIOLATED, held, checked, TOLERANCES, motion).sentence
+    names = " and ".join(model.pair_names[np.argmin(clearances(model, robot, motion)[:, 3])])
+    assert f"clearance ({names} " in found
+    assert "at 6 s; the margin is 0.05 m" in found
+    plain = explain(ResultCode.CONSTRAINTS_VIOLATED, held, checked, TOLERANCES).sentence
+    assert "clearance by 0.3 (allowed 0.001)" in plain
 
 
 def test_codes_under_vmap_are_int32(problem):

@@ -14,6 +14,7 @@ import sys
 import chex
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from jffsr import cli
 from jffsr.study import planning, searching
@@ -61,7 +62,10 @@ def test_folder_holds_what_is_promised(finished):
     sensitivity = summary["sensitivity"]
     assert set(sensitivity["bodies"]) == {row["body"] for row in sensitivity["per_percent"]}
     assert len(sensitivity["per_percent"]) == 2 * 7
-    assert sensitivity["per_percent"][0]["sentence"] in summary_text(summary)
+    text = summary_text(summary)
+    assert sensitivity["per_percent"][0]["sentence"] in text
+    assert "clearance     not looked at" in text
+    assert summary["terms"]["attitude_change"]["unit"] == "rad"
     assert summary["versions"]["jax"]
     lines = [json.loads(line) for line in (finished / "metrics.jsonl").read_text().splitlines()]
     assert lines[0]["phase"] == "swarm"
@@ -88,6 +92,21 @@ def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
     assert max(map(len, (replay, report))) < 3e6
     shutil.rmtree(finished / "figures")
     assert sorted(path.name for path in finished.iterdir()) == before
+
+
+def test_the_summary_tells_how_far_the_base_turns(finished):
+    """Beside SciPy's rotations of the written quaternions."""
+    summary, dataset = (
+        json.loads((finished / "summary.json").read_text()),
+        open_dataset(finished / "result.nc"),
+    )
+    turned = Rotation.from_quat(dataset["base_quaternion"].values, scalar_first=True)
+    angle = (turned[0].inv() * turned).magnitude()
+    moved = np.linalg.norm(dataset["base_position"].values - dataset["base_position"].values[0], axis=1)
+    assert summary["base"]["final_turn_rad"] == pytest.approx(angle[-1], abs=1e-12)
+    assert summary["base"]["largest_turn_rad"] == pytest.approx(angle.max(), abs=1e-12)
+    assert summary["base"]["largest_displacement_m"] == pytest.approx(moved.max(), rel=1e-12)
+    assert f"turned by {np.rad2deg(angle[-1]):.4g} deg at the end" in summary_text(summary)
 
 
 def test_result_is_labelled_and_exact(finished):
