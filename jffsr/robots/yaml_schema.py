@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import PrivateAttr
+from pydantic import PrivateAttr, model_validator
 
 from jffsr.errors import InputError
 from jffsr.reading.section import Section
 from jffsr.reading.sources import Sources
-from jffsr.reading.values import choice, sequence, text
+from jffsr.reading.values import choice, conflict, sequence, text
 from jffsr.robots.description import (
     FIXED,
     ArmDescription,
@@ -60,7 +60,9 @@ class LinkModel(Section):
 
 
 class LimitsModel(Section):
-    """Joint limits; each in rad or m, or in degrees under the key that ends in _deg."""
+    """Joint limits; each in rad or m, or, of a joint that turns, in degrees under the key that ends in _deg."""
+
+    units: ClassVar = ("position", "rate", "acceleration")
 
     position: Pair | None = None
     position_deg: Pair | None = None
@@ -69,6 +71,11 @@ class LimitsModel(Section):
     acceleration: Number | None = None
     acceleration_deg: Number | None = None
     torque: Number | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> LimitsModel:
+        self.check_units()
+        return self
 
 
 class JointModel(Section):
@@ -82,6 +89,14 @@ class JointModel(Section):
     rpy_deg: Triple = ORIGIN
     axis: Triple | None = None
     limits: LimitsModel = LimitsModel()
+
+    @model_validator(mode="after")
+    def _check(self) -> JointModel:
+        for quantity in LimitsModel.units:
+            key = self.limits.key_of(quantity)
+            if self.type == "prismatic" and key.endswith("_deg"):
+                raise conflict(f"given, but the joint slides; give '{quantity}', in m", f"limits.{key}")
+        return self
 
 
 class EndEffectorModel(Section):
@@ -237,7 +252,7 @@ def _shape(shape: ShapeModel, link: str, number: int) -> Shape:
 
 def _joint(joint: JointModel) -> JointDescription:
     limits = joint.limits
-    low, high = _either(limits.position, limits.position_deg, [-np.inf, np.inf])
+    low, high = _given(limits, "position", (-np.inf, np.inf))
     axis = joint.axis if joint.axis is not None else [0.0, 0.0, 1.0 if joint.type == FIXED else 0.0]
     return JointDescription(
         name=joint.name,
@@ -248,13 +263,12 @@ def _joint(joint: JointModel) -> JointDescription:
         rotation=rpy_deg_to_matrix(joint.rpy_deg),
         axis=np.array(axis, dtype=float),
         position_limit=(float(low), float(high)),
-        velocity_limit=float(_either(limits.rate, limits.rate_deg, np.inf)),
-        acceleration_limit=float(_either(limits.acceleration, limits.acceleration_deg, np.inf)),
+        velocity_limit=float(_given(limits, "rate", np.inf)),
+        acceleration_limit=float(_given(limits, "acceleration", np.inf)),
         torque_limit=float(limits.torque if limits.torque is not None else np.inf),
     )
 
 
-def _either(plain, degrees, default):
-    if plain is not None:
-        return plain
-    return np.deg2rad(degrees) if degrees is not None else default
+def _given(limits: LimitsModel, quantity: str, default):
+    value = limits.si(quantity)
+    return default if value is None else value

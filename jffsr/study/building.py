@@ -29,6 +29,7 @@ from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
 from jffsr.study.building_constraints import build_constraints
 from jffsr.study.calls import called_function
+from jffsr.study.degrees import refuse_degrees
 from jffsr.study.joint_laws import build_trajectory
 from jffsr.study.robot_study import RobotStudy
 from jffsr.study.schema import PlanningConfig
@@ -63,6 +64,8 @@ def build_robot(config: RobotStudy) -> Robot:
         robot = load_robot(config.robot)
     except InputError as error:
         raise InputError(f"{config.where('robot')}: {error}") from None
+    for quantity in ("position", "rate", "acceleration"):
+        refuse_degrees(config, "limits", quantity, robot)
     limits, names = robot.limits, robot.joint_names
     own = list(zip(limits.position_lower, limits.position_upper, strict=True))
     position = config.per_joint("position", names, own)

@@ -7,6 +7,7 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.planning.reachability import check_duration_possible
 from jffsr.robots.robot import PRISMATIC, Robot
+from jffsr.study.degrees import refuse_degrees
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.schema_solver import BSPLINE, POLYNOMIAL, SINE_POLYNOMIAL
 from jffsr.trajectories.bspline import ClampedBSpline
@@ -35,6 +36,7 @@ def build_trajectory(config: PlanningConfig, robot: Robot) -> PlannedTrajectory:
 
 
 def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: np.ndarray) -> None:
+    refuse_degrees(config, "task", quantity, robot)
     key, strict = config.task.key_of(quantity), config.trajectory.kind == SINE_POLYNOMIAL
     where = config.where(f"task.{key}")
     if value.size != robot.num_joints:

@@ -7,12 +7,14 @@ import numpy as np
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.robots.state import State
+from jffsr.study.degrees import refuse_degrees
 from jffsr.study.robot_study import RobotStudy
 
 
 def start_state(config: RobotStudy, robot: Robot) -> State:
     """The state at the start, at rest of the joints; InputError where the robot cannot be so."""
     task = config.task
+    refuse_degrees(config, "task", "start", robot)
     where, q = config.where(f"task.{task.key_of('start')}"), np.array(task.si("start"))
     if q.size != robot.num_joints:
         raise InputError(

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from jffsr.dynamics.base_mode import FLOATING
 from jffsr.reading.section import Section
-from jffsr.reading.values import choice, conflict, number, text, whole
+from jffsr.reading.values import choice, conflict, flag, number, text, whole
 from jffsr.study.capture.schema_target import Attitude, Inertia
 from jffsr.study.reactionless.schema_hold import ControllerName, EstimatorName, Hold
 from jffsr.study.robot_study import NAME, RobotStudy
@@ -16,6 +16,7 @@ from jffsr.study.schema_solver import Output
 from jffsr.study.schema_start import Start
 from jffsr.study.schema_task import MotionLimits, Vector3
 
+Flag = Annotated[bool, flag()]
 Positive = Annotated[float, number(gt=0)]
 NotNegative = Annotated[float, number(ge=0)]
 RunName = Annotated[str, text(r"[^\n]{1,60}", "a name of at most 60 letters")]
@@ -59,7 +60,7 @@ class Pendulum(Section):
     incidence: NotNegative | None = None
     contact: Positive = 0.01  # s
     arm: Positive = 0.1  # m
-    with_force: bool = False
+    with_force: Flag = False
 
     @model_validator(mode="before")
     @classmethod
