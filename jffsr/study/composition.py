@@ -72,7 +72,7 @@ def _collect(path: Path, above: list[Path], documents: list[Document]) -> None:
         _collect(included, chain, documents)
         if len(documents) > MAX_FILES:
             raise InputError(f"{place}: the study builds on more than {MAX_FILES} files")
-    anchor_robot(document.value, path.parent)
+    anchor_files(document.value, path.parent)
     documents.append(document)
 
 
@@ -87,11 +87,20 @@ def _included(path: Path, name: Any, place: str) -> Path:
     raise InputError(f"{place}: there is no file '{name}' next to {path.name}{hint(Path(name).stem, there)}")
 
 
-def anchor_robot(value: dict[str, Any], folder: Path) -> None:
-    """Make a robot's path absolute: the composed study is written elsewhere and must still find it."""
+def anchor_files(value: dict[str, Any], folder: Path) -> None:
+    """Make paths absolute, of a robot and of a capability map: the composed study is written elsewhere."""
     robot = value.get("robot")
-    if isinstance(robot, str) and ("/" in robot or robot.endswith(_FILE_ENDINGS)) and "\0" not in robot:
-        value["robot"] = os.path.abspath(os.path.join(folder, os.path.expanduser(robot)))
+    if isinstance(robot, str) and ("/" in robot or robot.endswith(_FILE_ENDINGS)):
+        value["robot"] = _absolute(robot, folder)
+    section, key = (
+        (value, "grasp_time.map") if "grasp_time.map" in value else (value.get("grasp_time"), "map")
+    )
+    if isinstance(section, dict) and isinstance(section.get(key), str):
+        section[key] = _absolute(section[key], folder)
+
+
+def _absolute(path: str, folder: Path) -> str:
+    return path if "\0" in path else os.path.abspath(os.path.join(folder, os.path.expanduser(path)))
 
 
 def _checked(overrides: Sequence[str]) -> list[str]:
@@ -117,7 +126,7 @@ def override(text: str) -> Document:
     document = parse(value, source, key, with_lines=False)
     marks = document.marks or {key: Mark(source, None, "")}
     payload = {dotted: document.value}
-    anchor_robot(payload, Path.cwd())
+    anchor_files(payload, Path.cwd())
     return Document((dotted, payload[dotted]), marks)
 
 

@@ -14,7 +14,9 @@ from typing import Any
 from jffsr.errors import InputError
 from jffsr.study.atomic import plain, write_text
 from jffsr.study.config import Study, dump_config, load_config
-from jffsr.study.robot_files import robot_files
+from jffsr.study.robot_files import RobotFiles, robot_files
+
+MAP = "capability_map"
 
 
 class RunFolder:
@@ -106,9 +108,8 @@ def claim_run_folder(config: Study, out: str | Path | None) -> RunFolder:
     """
     path = free_name(Path("runs"), config.name) if out is None else Path(out)
     folder = RunFolder(path)
-    carried = robot_files([config.robot])
-    robot = carried.names.get(config.robot, config.robot)
-    text = dump_config(config.model_copy(update={"robot": robot}))
+    carried, config = carried_files(config)
+    text = dump_config(config)
     if path.is_dir() and any(path.iterdir()):
         if not folder.config.is_file():
             raise InputError(f"--out {path}: the folder is not empty and holds no run; give another")
@@ -125,6 +126,18 @@ def claim_run_folder(config: Study, out: str | Path | None) -> RunFolder:
     except OSError as error:
         raise InputError(f"--out {path}: cannot be written ({error.strerror or error})") from None
     return folder
+
+
+def carried_files(config: Study) -> tuple[RobotFiles, Study]:
+    """The files of the study's robot and its capability map, and the study with their places in its folder."""
+    carried = robot_files([config.robot])
+    changes: dict[str, Any] = {"robot": carried.names.get(config.robot, config.robot)}
+    when = getattr(config, "grasp_time", None)
+    if when is not None and when.map is not None:
+        name = MAP + Path(when.map).suffix
+        carried = RobotFiles(carried.names, {**carried.files, name: Path(when.map).read_bytes()})
+        changes["grasp_time"] = when.model_copy(update={"map": name})
+    return carried, config.model_copy(update=changes)
 
 
 def free_name(parent: Path, name: str) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from jffsr.study.run_folder import RunFolder, claim_run_folder
 from jffsr.study.sweep.folder import claim_sweep_folder
 from jffsr.study.sweep.specification import read_sweep
 
+CAPTURE = next((Path(__file__).parents[2] / "configs" / "capture").glob("tumbling*.yaml"))
 ARM = """\
 <robot name="arm">
   <link name="bus"><inertial><mass value="90"/>
@@ -100,6 +102,22 @@ def test_a_run_goes_on_with_the_same_robot_alone(tmp_path, project):
     ):
         claim_run_folder(load_config(task), out)
     assert "90" in (out / "robot" / "urdf" / "arm.urdf").read_text()
+
+
+def test_a_capability_map_comes_along(tmp_path, project):
+    """Its path is relative to the study's file, and on the command line to the current folder."""
+    (project / "maps").mkdir()
+    (project / "maps" / "arm.nc").write_bytes(b"a map")
+    study = project / "studies" / "capture.yaml"
+    study.write_text(f"defaults: [{CAPTURE}]\ngrasp_time: {{map: ../maps/arm.nc}}\n")
+    config = load_config(study)
+    assert config.grasp_time.map == str(project / "maps" / "arm.nc")
+    claim_run_folder(config, tmp_path / "run")
+    found = RunFolder(elsewhere(tmp_path, project)).read_config()
+    assert Path(found.grasp_time.map) == tmp_path / "shared" / "run" / "capability_map.nc"
+    assert Path(found.grasp_time.map).read_bytes() == b"a map"
+    here = load_config(CAPTURE, ["grasp_time.map=maps/other.nc"])
+    assert Path(here.grasp_time.map) == Path.cwd() / "maps" / "other.nc"
 
 
 def test_a_sweep_carries_every_robot(tmp_path, project):

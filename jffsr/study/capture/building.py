@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 import jax
@@ -29,6 +30,7 @@ from jffsr.study.building import build_robot
 from jffsr.study.capture.schema import CaptureConfig
 from jffsr.study.capture.schema_planner import CRITERION, FREE
 from jffsr.study.capture.schema_target import Attitude
+from jffsr.study.lookup import shown
 from jffsr.study.start import chosen_end_effector, start_state
 from jffsr.target.body import Frame, Target
 from jffsr.target.target_state import TargetState
@@ -229,7 +231,7 @@ def _shape(config: CaptureConfig, number: int, section: ShapeModel) -> Shape:
 def _capability(config: CaptureConfig, robot: Robot, end_effector: str) -> CapabilityMap | None:
     if config.grasp_time.map is None:
         return None
-    found = _told(config, "grasp_time.map", lambda: load_capability_map(config.grasp_time.map))
+    found = _told(config, "grasp_time.map", lambda: load_capability_map(shown(Path(config.grasp_time.map))))
     if (found.robot, found.end_effector) != (robot.name, end_effector):
         raise InputError(
             f"{config.where('grasp_time.map')}: the map is of '{found.robot}' with '{found.end_effector}', the robot "

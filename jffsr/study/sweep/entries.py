@@ -11,7 +11,7 @@ from jffsr.errors import InputError
 from jffsr.reading.did_you_mean import hint
 from jffsr.reading.sources import Sources
 from jffsr.reading.yaml_lines import Document, Key
-from jffsr.study.composition import anchor_robot
+from jffsr.study.composition import anchor_files
 
 _DOTTED = re.compile(r"[A-Za-z_]\w*(\.\w+){0,20}", re.ASCII)
 _NOT_SWEPT = ("kind", "name", "defaults")
@@ -84,7 +84,7 @@ class Entries:
         mark = self._sources.mark(place)
         check_key(key, mark.place if mark else key)
         payload = {key: value}
-        anchor_robot(payload, self._folder)
+        anchor_files(payload, self._folder)
         return Document((key, payload[key]), {tuple(key.split(".")): mark})
 
 

@@ -16,7 +16,7 @@ from jffsr.errors import InputError
 from jffsr.reading.files import read_text
 from jffsr.reading.sources import Sources
 from jffsr.reading.yaml_lines import Document, parse
-from jffsr.study.composition import anchor_robot, compose, override
+from jffsr.study.composition import anchor_files, compose, override
 from jffsr.study.config import dump_values, name_from
 from jffsr.study.lookup import find_config, shown, with_suffixes
 from jffsr.study.sweep.arguments import Argument, read_arguments
@@ -164,7 +164,7 @@ def _base(entries: Entries, path: Path) -> tuple[str, dict[str, Any], Sources]:
     if isinstance(base, dict):
         marks = {key[1:]: mark for key, mark in entries.document_marks.items() if key[:1] == ("base",)}
         base = dict(base)
-        anchor_robot(base, path.parent)
+        anchor_files(base, path.parent)
         return str(base.get("name") or path.stem), base, Sources((marks,), 0)
     if not isinstance(base, str):
         raise entries.refusal(
