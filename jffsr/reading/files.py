@@ -10,6 +10,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from jffsr.errors import InputError
+from jffsr.reading.did_you_mean import hint
 
 MAX_BYTES = 1_000_000
 
@@ -51,7 +52,7 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
     except IsADirectoryError:
         raise InputError(f"{shown}: this is a folder, {expected} is expected") from None
     except FileNotFoundError:
-        raise InputError(f"{shown}: there is no such file") from None
+        raise InputError(f"{shown}: there is no such file{hint(path.name, _beside(path))}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{shown!r}: the file cannot be read ({reason.lower()})") from None
@@ -60,3 +61,11 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
     if (noted := _NOTED.get()) is not None:
         noted[os.path.abspath(path)] = data
     return data
+
+
+def _beside(path: Path) -> list[str]:
+    """Names of the files of the same kind in the folder of a file that is not there."""
+    try:
+        return sorted(other.name for other in path.parent.iterdir() if other.suffix == path.suffix)
+    except OSError:
+        return []

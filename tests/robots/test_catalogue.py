@@ -71,6 +71,11 @@ def test_an_unknown_name_is_refused_with_the_nearest():
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"gone\.yaml: there is no such file"):
         load_robot(tmp_path / "gone.yaml")
+    (tmp_path / "tender.urdf").write_text("<robot/>")
+    with pytest.raises(
+        InputError, match=r"tendr\.urdf: there is no such file; did you mean 'tender\.urdf'\?"
+    ):
+        load_robot(tmp_path / "tendr.urdf")
 
 
 def test_a_file_gives_what_the_builder_makes_of_it(robots):

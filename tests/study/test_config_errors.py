@@ -314,6 +314,14 @@ def test_a_name_longer_than_any_file_is_refused():
         load_config("a" * 300)
 
 
+def test_a_misspelt_file_is_told_with_the_one_beside_it():
+    write("studies/tender.yaml", GOOD)
+    with pytest.raises(
+        InputError, match=r"'studies/tendr\.yaml' is no file; did you mean 'studies/tender\.yaml'\?"
+    ):
+        load_config("studies/tendr.yaml")
+
+
 def test_overrides_are_a_list_of_texts():
     write("x.yaml", GOOD)
     with pytest.raises(
