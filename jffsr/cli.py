@@ -214,14 +214,15 @@ def _show(arguments: argparse.Namespace) -> int:
 def _print_one(folder: Path) -> list[Path]:
     """Print a finished run or sweep, draw its figures, and return their files."""
     from jffsr.study.kinds import summary_text
-    from jffsr.study.run_folder import RunFolder
     from jffsr.viz import showing
 
-    summary = RunFolder(folder).read_summary()
+    summary = showing.read_summary(folder)
     files = showing.draw(folder)
     if showing.is_sweep(folder):
         print((folder / "table.md").read_text(encoding="utf-8"))
         print(f"{summary['name']}: {summary['result']['sentence']}")
+        for failure in summary.get("failures", ()):
+            print(f"  failed        {failure}")
     else:
         print(summary_text(summary))
     print("  figures       " + "\n                ".join(str(file) for file in files))

@@ -15,8 +15,9 @@ from jffsr.errors import InputError
 from jffsr.robots.geometry import MESH, VISUAL
 from jffsr.robots.robot import Robot
 from jffsr.viz.labels import draw_labels, label_widths
+from jffsr.viz.replay.bodies import BASE, LINKS, bare_parts
 from jffsr.viz.scene import Scene, scene_at
-from jffsr.viz.solids import capsule_between, outward, refined, shape_faces
+from jffsr.viz.solids import outward, refined, shape_faces
 from jffsr.viz.style import COLOURS, legend_above, new_figure, styled
 from jffsr.viz.view import across_view, fill, flatten, frame_plane, frame_space, viewpoint
 
@@ -51,9 +52,9 @@ def draw_still(robot: Robot, joint_position: np.ndarray | None = None) -> Still:
 
     None is zero, or the middle of its range for a joint that cannot be there; where that folds the arm
     together, one or two joints are turned by right angles, those that take the tools farthest from the base.
-    Every body is drawn by the shapes that its file gives it to be seen; without such, the base as the uniform
-    box of its mass and inertia, a link as capsules from joint to joint. A planar robot is drawn from above,
-    any other in three dimensions; all axes have one scale. Raises InputError for a posture of another shape
+    Every body is drawn by the shapes that its file gives it to be seen, or as in a replay by those made from masses
+    and inertias (`bare_parts`). A planar robot is drawn from above, any other in three dimensions; all axes have one
+    scale. Raises InputError for a posture of another shape
     or with numbers that are not finite.
     """
     if joint_position is None:
@@ -155,21 +156,18 @@ def _legend(tool_axes: int) -> tuple[list[Line2D], list[str]]:
 
 def solids_of(robot: Robot, scene: Scene, sample: int) -> list[tuple[np.ndarray, tuple, bool, bool]]:
     """One entry a shape: faces (f, 4, 3) in I, colour, whether no back can be seen, whether on the base."""
-    found, bare = [], []
+    found = []
     for body, name in enumerate(robot.body_names):
-        shapes = robot.geometry.on_body(name, VISUAL)
-        for shape in shapes:
+        for shape in robot.geometry.on_body(name, VISUAL):
             faces = shape_faces(shape) @ scene.rotation[sample, body].T + scene.origin[sample, body]
             found.append((faces, shape.colour or _colour(body), shape.kind != MESH, body == 0))
-        if not shapes:
-            bare.append(body)
-    if 0 in bare:
-        found.append((scene.base_faces[sample], _colour(0), False, True))
-    lines = np.concatenate([scene.segments[sample].reshape(-1, 3), *(f.reshape(-1, 3) for f, *_ in found)])
-    radius = 0.012 * np.ptp(lines, axis=0).max()
-    for body, (start, end) in zip(scene.owners, scene.segments[sample], strict=True):
-        if body in bare and np.linalg.norm(end - start) > 0:
-            found.append((capsule_between(start, end, radius), _colour(int(body)), True, body == 0))
+    for part in bare_parts(robot, scene):
+        faces = part.faces @ scene.rotation[sample, part.body].T + scene.origin[sample, part.body]
+        # On paper bodies are a little lighter than on a screen.
+        colour = _colour(part.body) if part.colour in (BASE, *LINKS) else part.colour
+        # Of a base without extent along some axis the box has no inside.
+        is_closed = part.name != robot.body_names[0]
+        found.append((faces, colour, is_closed, part.body == 0))
     return found
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from jffsr.errors import InputError
 from jffsr.study.run_folder import RunFolder
+from jffsr.study.sweep.folder import SweepFolder
 from jffsr.viz.replay.momenta import with_one_scale
 from jffsr.viz.replay.replay import Replay
 from jffsr.writing import write_atomically
@@ -17,9 +19,20 @@ _MOST = 16
 """Replays that are shown side by side."""
 
 
+def read_summary(path: str | Path) -> dict[str, Any]:
+    """The summary of a finished run, or of a sweep that came to its end; InputError where there is none."""
+    from jffsr.study.sweep.ended import read_ended
+
+    folder = RunFolder(Path(path))
+    # A sweep of which points are missing has no summary.json.
+    if not folder.finished and SweepFolder(folder.path).result.is_file():
+        return read_ended(path)
+    return folder.read_summary()
+
+
 def is_sweep(path: str | Path) -> bool:
     """Whether the folder is that of a finished sweep; InputError where it is not finished, or neither."""
-    return RunFolder(Path(path)).read_summary().get("kind") == SWEEP
+    return read_summary(path).get("kind") == SWEEP
 
 
 def draw(path: str | Path) -> list[Path]:
@@ -36,10 +49,9 @@ def draw(path: str | Path) -> list[Path]:
 def replays_of_all(paths: Sequence[str | Path]) -> list[Replay]:
     """The replays of all runs, by their folders' names where there are several; InputError where nothing moved."""
     found = []
-    for path in paths:
+    for path, name in zip(paths, _names(paths), strict=True):
         replays = _replays(path)
         if len(paths) > 1:
-            name = Path(path).resolve().name
             replays = [
                 replay.named(name if len(replays) == 1 else f"{name}: {replay.title}") for replay in replays
             ]
@@ -50,11 +62,12 @@ def replays_of_all(paths: Sequence[str | Path]) -> list[Replay]:
 
 
 def write_page(paths: Sequence[str | Path], file: Path) -> Path:
-    """The replays of runs, side by side, as one HTML file."""
+    """The replays of runs, side by side, as one HTML file; of several runs also in what they differ."""
     from jffsr.viz.report.page import replay_page
 
     _check_page(file)
-    return _write(file, replay_page(replays_of_all(paths), _title(paths)))
+    replays = replays_of_all(paths)
+    return _write(file, replay_page(replays, _title(paths), _comparison(paths, replays)))
 
 
 def write_report(path: str | Path, figures: Sequence[Path], file: Path) -> Path:
@@ -100,8 +113,28 @@ def _replays(path: str | Path) -> list[Replay]:
     return replays_of(path)
 
 
+def _comparison(paths: Sequence[str | Path], replays: Sequence[Replay]) -> str:
+    from jffsr.viz.report.differences import RunRead, compared_runs
+    from jffsr.viz.report.together import curves_together
+
+    if len(paths) < 2:
+        return ""
+    names = _names(paths)
+    runs = [RunRead(path, name, read_summary(path)) for path, name in zip(paths, names, strict=True)]
+    return compared_runs(runs, curves_together(replays))
+
+
 def _title(paths: Sequence[str | Path]) -> str:
-    return " | ".join(Path(path).resolve().name for path in paths)
+    return " | ".join(_names(paths))
+
+
+def _names(paths: Sequence[str | Path]) -> list[str]:
+    """The folders' names, with the folders around them where two are called alike."""
+    places = [Path(path).resolve() for path in paths]
+    names = [place.name for place in places]
+    if len(set(names)) == len(set(places)):
+        return names
+    return [f"{place.parent.name}/{place.name}" for place in places]
 
 
 def _check_page(file: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from jffsr.study.sweep.points import Point, value_text
 
 MISSING = -1
 """The code of a point that could not be computed."""
+FAILURE = "failure"
+"""The variable that says why, empty for all other points; it is there only where some point could not be computed."""
 
 _UNITS = {
     "code": ("1", "result code: 0 accuracy met, -1 not computed"),
@@ -45,15 +47,25 @@ _KEY_UNITS = {
 }
 
 
-def merged(points: Sequence[Point], parts: Sequence[Part], name: str, accuracy: float):
-    """An xarray Dataset over the points; what a point has not is NaN, its code -1 where it was not computed."""
+def merged(
+    points: Sequence[Point],
+    parts: Sequence[Part],
+    name: str,
+    accuracy: float,
+    failures: Mapping[int, str] | None = None,
+):
+    """An xarray Dataset over the points; what a point has not is NaN, its code -1 where it was not computed.
+
+    failures: reasons of the points that could not be computed, by their numbers.
+    """
     import xarray
 
     count = len(points)
     variables: dict[str, Any] = {}
-    overruns = dict.fromkeys(name for part in parts for name in part.results if name.startswith(OVERRUN))
-    for name in overruns:
-        overruns[name] = ("1", f"largest relative overrun of a limit: {name.removeprefix(OVERRUN)}")
+    limits = dict.fromkeys(key for part in parts for key in part.results if key.startswith(OVERRUN))
+    overruns = {
+        key: ("1", f"largest relative overrun of a limit: {key.removeprefix(OVERRUN)}") for key in limits
+    }
     for quantity, (unit, meaning) in {**_UNITS, **overruns}.items():
         blank = MISSING if quantity == "code" else 0 if quantity in _COUNTS else np.nan
         values = np.full(count, blank, dtype=np.int64 if quantity in _COUNTS else float)
@@ -77,6 +89,9 @@ def merged(points: Sequence[Point], parts: Sequence[Part], name: str, accuracy: 
     for quantity, meaning in _HISTORY.items():
         attributes = {"units": "1", "long_name": f"{meaning}; steps spread evenly over the search"}
         variables[quantity] = (("point", "step"), _padded(count, parts, quantity), attributes)
+    if failures:
+        reasons = np.array([failures.get(number, "") for number in range(count)])
+        variables[FAILURE] = ("point", reasons, {"long_name": "why the point could not be computed"})
     keys = swept_keys(points)
     for key in keys:
         unit = "deg" if key.endswith("_deg") else _KEY_UNITS.get(key, "1")

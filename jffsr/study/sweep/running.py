@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from jffsr.errors import InputError
-from jffsr.planning.result import ResultCode
 from jffsr.study.atomic import write_json, write_text
 from jffsr.study.interrupt import Interrupt
-from jffsr.study.summary import versions
+from jffsr.study.sweep.ended import summary_of
 from jffsr.study.sweep.folder import SweepFolder, claim_sweep_folder
 from jffsr.study.sweep.local import Outcome, run_here
-from jffsr.study.sweep.merging import MISSING, merged, save_sweep
+from jffsr.study.sweep.merging import merged, save_sweep
 from jffsr.study.sweep.parts import Part, load_parts, save_part
 from jffsr.study.sweep.points import Point, expand
 from jffsr.study.sweep.significance import compare
@@ -89,12 +86,14 @@ def _run(
     todo = [left for task in tasks if (left := task.without(done)) is not None]
     say(f"{spec.name}: {len(points)} points in {len(tasks)} compiled calls" + _going_on(done))
     failures: list[str] = []
+    reasons: dict[int, str] = {}
     ended = 0
     with Interrupt() as interrupted:
         for task, results, why in _outcomes(todo, client, interrupted, workers):
             ended += 1
             if results is None:
                 failures.append(f"{task.title}: {why}")
+                reasons |= dict.fromkeys(task.numbers, why)
                 say(failures[-1])
                 continue
             try:
@@ -109,7 +108,7 @@ def _run(
     if ended < len(todo):
         return Sweep(folder, None, interrupted=True)
     try:
-        summary, table = _finish(folder, spec, points, parts, failures)
+        summary, table = _finish(folder, spec, points, parts, reasons)
     except OSError as error:
         raise _no_room(folder, error, len(done), len(points)) from None
     return Sweep(folder, summary, table, tuple(failures), figures=points[0].config.output.figures)
@@ -141,34 +140,15 @@ def _finish(
     spec: Specification,
     points: Sequence[Point],
     parts: Sequence[Part],
-    failures: Sequence[str],
+    failures: Mapping[int, str],
 ) -> tuple[dict[str, Any], str]:
     """Write sweep.nc and table.md, then, where every point is in them, the summary that says so."""
-    dataset = merged(points, sorted(parts, key=lambda part: part.numbers), spec.name, _accuracy(points))
+    ordered = sorted(parts, key=lambda part: part.numbers)
+    dataset = merged(points, ordered, spec.name, _accuracy(points), failures)
     save_sweep(dataset, folder.result)
     comparisons = compare(dataset, keys_of(dataset))
     write_text(folder.table, markdown(dataset, comparisons))
-    code = dataset["code"].values
-    computed = code != MISSING
-    met = int(np.count_nonzero(code == ResultCode.ACCURACY_MET))
-    summary = {
-        "kind": "sweep",
-        "name": spec.name,
-        "result": {
-            "code": int(met < len(points)),
-            "sentence": f"{met} of {len(points)} points met their accuracy"
-            + (f"; {len(points) - int(computed.sum())} could not be computed" if failures else ""),
-        },
-        "points": len(points),
-        "computed": int(computed.sum()),
-        "met": met,
-        "failures": list(failures),
-        "evaluations": {
-            "objective": int(dataset["evaluations"].values.sum()),
-            "gradient": int(dataset["gradient_evaluations"].values.sum()),
-        },
-        "versions": versions(),
-    }
+    summary = summary_of(dataset, spec.name)
     if not failures:
         write_json(folder.summary, summary)
     return summary, markdown(dataset, comparisons, MOST_PRINTED)

@@ -38,31 +38,51 @@ class Part(NamedTuple):
     joint: int | None = None
 
 
+class Bare(NamedTuple):
+    """A piece of a robot whose file shows nothing there: as `Part`, with faces (f, 4, 3), m, that look outwards."""
+
+    name: str
+    body: int
+    faces: np.ndarray
+    colour: Colour
+    joint: int | None = None
+
+
 def robot_parts(robot: Robot, scene: Scene) -> list[Part]:
     """All pieces of a robot, from the scene of a motion of it.
 
-    A body that its file gives shapes to be seen by has those. Without, the base is the uniform box of its mass and
-    inertia, and a link a round tube from joint to joint, as thick as a rod of its mass that turns about itself as
-    hard as the link about its easiest axis, within what looks like an arm; a joint is a housing along its axis, a
-    tool a disc.
+    A body that its file gives shapes to be seen by has those; the others as in `bare_parts`.
     """
-    names, parts = robot.body_names, []
-    bare = [body for body, name in enumerate(names) if not robot.geometry.on_body(name, VISUAL)]
-    for body, name in enumerate(names):
+    parts = []
+    for body, name in enumerate(robot.body_names):
         shapes = robot.geometry.on_body(name, VISUAL)
         for number, (colour, mesh) in enumerate(_by_colour(shapes, _colour(body)).items()):
             parts.append(Part(name if not number else f"{name} {number + 1}", body, *mesh, colour))
+    whole: dict[tuple[str, int], list[Bare]] = {}
+    for bare in bare_parts(robot, scene):
+        whole.setdefault((bare.name, bare.body), []).append(bare)
+    for (name, body), pieces in whole.items():
+        mesh = merged([triangles(piece.faces) for piece in pieces])
+        parts.append(Part(name, body, *mesh, pieces[0].colour, pieces[0].joint))
+    return parts
+
+
+def bare_parts(robot: Robot, scene: Scene) -> list[Bare]:
+    """What the bodies without shapes look like, from the scene of a motion; pieces of one name are one solid.
+
+    The base is the uniform box of its mass and inertia, and a link a round tube from joint to joint, as thick as a rod
+    of its mass that turns about itself as hard as the link about its easiest axis, within what looks like an arm; a
+    joint is a housing along its axis, a tool a disc.
+    """
+    names, parts = robot.body_names, []
+    bare = [body for body, name in enumerate(names) if not robot.geometry.on_body(name, VISUAL)]
     if 0 in bare:
-        faces = _into_body(scene, 0, scene.base_faces[0])
-        parts.append(Part(names[0], 0, *triangles(faces), BASE))
-    longest = _longest(scene)
-    radii = _radii(robot, longest)
+        parts.append(Bare(names[0], 0, _into_body(scene, 0, scene.base_faces[0]), BASE))
+    radii = _radii(robot, _longest(scene))
     for body in bare:
-        pieces = _pieces(scene, body)
-        tubes = [triangles(capsule_between(*ends, radii[body])) for ends in pieces]
-        if tubes:
-            label = f"{names[body]} link" if body else f"{names[0]} mount"
-            parts.append(Part(label, body, *merged(tubes), _colour(body)))
+        label = f"{names[body]} link" if body else f"{names[0]} mount"
+        for ends in _pieces(scene, body):
+            parts.append(Bare(label, body, capsule_between(*ends, radii[body]), _colour(body)))
     for joint, (child, name) in enumerate(zip(range(1, len(names)), robot.joint_names, strict=True)):
         parent = robot.topology.parents[joint]
         if child in bare or parent in bare:
@@ -71,14 +91,13 @@ def robot_parts(robot: Robot, scene: Scene) -> list[Part]:
             # What slides moves through its housing.
             body = child if robot.topology.is_revolute[joint] else parent
             ends = _into_body(scene, body, scene.joints[0, joint] + np.stack([-half, half]))
-            housing = triangles(cylinder_between(*ends, radius))
-            parts.append(Part(f"{name} joint", body, *housing, JOINT, joint))
+            parts.append(Bare(f"{name} joint", body, cylinder_between(*ends, radius), JOINT, joint))
     for tool, body in enumerate(robot.topology.end_effector_bodies):
         if body in bare:
             along = 0.5 * radii[body] * scene.tool_rotation[0, tool][:, 2]
             ends = _into_body(scene, body, scene.tools[0, tool] + np.stack([-along, along]))
-            disc = triangles(cylinder_between(*ends, 1.5 * radii[body]))
-            parts.append(Part(f"{robot.end_effector_names[tool]} tool", body, *disc, TOOL))
+            disc = cylinder_between(*ends, 1.5 * radii[body])
+            parts.append(Bare(f"{robot.end_effector_names[tool]} tool", body, disc, TOOL))
     return parts
 
 

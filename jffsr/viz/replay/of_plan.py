@@ -19,6 +19,10 @@ def planned_replays(path: Path) -> list[Replay]:
     if np.any(np.isfinite(limit)):
         share = np.abs(dataset["attitude_angle"].values) / limit
         extras.nearness = {problem.robot.body_names[0]: share.max(axis=1)}
+        allowed = ", ".join(f"{angle:.4g}" for angle in np.unique(np.rad2deg(limit[np.isfinite(limit)])))
+        extras.legend = (
+            f"The base shows how far it has turned from its start: red at its excursion limit ({allowed} deg).",
+        )
     if "joint_torque" in dataset:
         extras.panels = (torques(dataset),)
     return [robot_replay(run_name(folder), problem.robot, dataset, extras)]

@@ -94,10 +94,23 @@ def robot_replay(
         axes=tuple(axes),
         panels=(*joint_panels(robot, dataset), base_panel(dataset), *extras.panels),
         marks=extras.marks,
-        legend=(
-            "Joints and bodies turn amber and then red as they come near a limit of theirs.",
-            *extras.legend,
-        ),
+        legend=(limits_in_words(robot), *extras.legend),
+    )
+
+
+def limits_in_words(robot: Robot) -> str:
+    """What the colours of joints mean, in one sentence: which of their limits they show."""
+    limits = robot.limits
+    finite = {
+        "position": np.isfinite(limits.position_lower) | np.isfinite(limits.position_upper),
+        "rate": np.isfinite(limits.velocity),
+    }
+    shown = [name for name, has in finite.items() if np.any(has)]
+    if not shown:
+        return "The joints have no limit of position or rate, so that none of them changes its colour."
+    return (
+        f"A joint, or the body that it moves, shows its limits of {' and '.join(shown)}: "
+        "amber near the nearer one, red at it and beyond."
     )
 
 

@@ -13,6 +13,7 @@ from jffsr.objectives.terms import ROTATION_VECTOR, attitude_angles
 from jffsr.planning.problem import Problem
 from jffsr.study.building import build_problem
 from jffsr.study.dataset import open_dataset
+from jffsr.study.sweep.ended import read_ended
 from jffsr.study.sweep.folder import SweepFolder
 from jffsr.study.sweep.points import expand, value_text
 from jffsr.study.sweep.specification import read_sweep
@@ -31,7 +32,7 @@ def sweep_replays(path: Path) -> list[Replay]:
     Raises InputError where the sweep is not finished, or no point of it has a motion.
     """
     folder = SweepFolder(path)
-    folder.read_summary()
+    read_ended(path)
     try:
         dataset = open_dataset(folder.result)
     except Exception as error:

@@ -54,6 +54,9 @@ def capture_extras(robot: Robot, geometry: Geometry, dataset: Dataset) -> Extras
             own = [number for number, pair in enumerate(pairs) if body in pair.split(" and ")]
             if own:
                 extras.nearness[body] = near[own].max(axis=0)
+        extras.legend = (
+            f"Bodies and target show how near they come to each other: red at {margin:g} m, the margin between them.",
+        )
         if "target" in extras.nearness:
             extras.solids = tuple(
                 replace(solid, nearness=extras.nearness["target"]) for solid in extras.solids

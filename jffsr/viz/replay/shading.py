@@ -11,6 +11,8 @@ FAR = 0.7
 NEAR: Colour = (0.93, 0.66, 0.12)
 AT: Colour = (0.84, 0.16, 0.12)
 _STEPS = 8
+STATES = ((NEAR, "at 85 % of a limit"), (AT, "at a limit or beyond it"))
+"""What the two colours stand for; up to 70 % a thing has its own."""
 
 
 def warned(colour: Colour, nearness: float) -> Colour:

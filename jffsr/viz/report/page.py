@@ -37,6 +37,10 @@ def page(title: str, body: str, whole: bool = False) -> str:
 """
 
 
-def replay_page(replays: Sequence[Replay], title: str) -> str:
-    """A page of one replay or several side by side, with their plots; raises InputError without viser."""
-    return page(title, f"<h1>{escape(title)}</h1>\n{replay_block(replays, title)}", whole=True)
+def replay_page(replays: Sequence[Replay], title: str, below: str = "") -> str:
+    """A page of one replay or several side by side, with their plots; raises InputError without viser.
+
+    below is what follows them, as HTML.
+    """
+    body = f"<h1>{escape(title)}</h1>\n{replay_block(replays, title)}\n{below}"
+    return page(title, body, whole=True)

@@ -10,6 +10,7 @@ from html import escape
 
 import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from jffsr.viz.replay.replay import Panel
 from jffsr.viz.replay.thinning import chosen_samples
@@ -63,11 +64,20 @@ def draw_panel(panel: Panel, marks: Sequence[tuple[str, float]], salt: str, poin
     first, last = float(panel.time[0]), float(panel.time[-1])
     axes.set_xlim(first, last)
     axes.set_xlabel("time [s]")
+    svg = as_svg(figure, f"{panel.title}{salt}", f"{panel.title} over time")
+    box = axes.get_position()
+    return Plot(svg, float(box.x0), float(box.x1), first, last, time, values)
+
+
+def as_svg(figure: Figure, salt: str, label: str) -> str:
+    """A figure as an svg for a page, as wide as its place; label says what it shows to those who cannot see it.
+
+    salt keeps apart what several drawings in one page call by name.
+    """
     # Words as words: they stay sharp, can be searched, and take no room.
-    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"{panel.title}{salt}"}):
+    with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": salt}):
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None}, transparent=True)
-    box = axes.get_position()
     text = buffer.getvalue()
     svg = re.sub(
         r'width="[^"]*pt" height="[^"]*pt"|height="[^"]*pt" width="[^"]*pt"',
@@ -77,8 +87,8 @@ def draw_panel(panel: Panel, marks: Sequence[tuple[str, float]], salt: str, poin
     )
     # Without its name for the metadata's vocabulary a page asks nobody for anything, and says nothing it need not.
     svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    # Names of groups, which are the same in every drawing, and which nothing asks for.
+    svg = re.sub(r'<g id="[\w.]+_\d+">', "<g>", svg)
     # A hundredth of a point is enough to draw with.
     svg = re.sub(r' d="[^"]*"', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]).replace("\n", " "), svg)
-    label = escape(f"{panel.title} over time", quote=True)
-    svg = svg.replace("<svg ", f'<svg role="img" aria-label="{label}" ', 1)
-    return Plot(svg, float(box.x0), float(box.x1), first, last, time, values)
+    return svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label, quote=True)}" ', 1)

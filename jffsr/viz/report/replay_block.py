@@ -10,7 +10,8 @@ import numpy as np
 
 from jffsr.viz.replay.momenta import legend_of
 from jffsr.viz.replay.recording import all_times, record_html
-from jffsr.viz.replay.replay import Panel, Replay
+from jffsr.viz.replay.replay import Colour, Panel, Replay
+from jffsr.viz.replay.shading import STATES
 from jffsr.viz.report.plots import Plot, draw_panel, points_each
 from jffsr.viz.style import line_look
 
@@ -49,10 +50,22 @@ def replay_block(replays: Sequence[Replay], title: str) -> str:
 <div class="beside">{tabs}
 {"".join(groups)}
 </div>
-<ul class="legend">{legend}
+<ul class="legend">{_states(replays)}{legend}
 <li>Drag to look around; space plays and pauses; click on a plot to go to that instant.</li></ul>
 <script type="application/json" id="replay-data">{numbers}</script>
 </section>"""
+
+
+def _states(replays: Sequence[Replay]) -> str:
+    """The colours of what comes near a limit; nothing where nothing has one."""
+    if all(solid.nearness is None for replay in replays for solid in replay.solids):
+        return ""
+    keys = "; ".join(f"{_swatch(colour)}{escape(meaning)}" for colour, meaning in STATES)
+    return f"<li>Colours: a part's own up to 70 % of its limit; {keys}.</li>"
+
+
+def _swatch(colour: Colour) -> str:
+    return f'<i style="background:rgb({", ".join(str(round(255 * part)) for part in colour)})"></i>'
 
 
 def _figure(plot: Plot, panel: Panel) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from jffsr.study.building import build_robot
 from jffsr.study.kinds import summary_text
 from jffsr.study.run_folder import RunFolder
 from jffsr.viz.replay.reading import replays_of
@@ -16,7 +17,10 @@ from jffsr.viz.replay.replay import NothingMoved, Replay
 from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
 from jffsr.viz.report.replay_block import replay_block
-from jffsr.viz.report.tables import compared, flattened, measured, table, terms_table
+from jffsr.viz.report.simulators import simulators_block
+from jffsr.viz.report.tables import compared, measured, table, terms_table
+from jffsr.viz.report.task import task_tables
+from jffsr.viz.report.units import NO_UNIT, term_unit
 
 _KINDS = {
     "planning": "A planned motion",
@@ -25,8 +29,8 @@ _KINDS = {
     "reactionless": "A base held still after contact",
     "chain": "From the first picture of a target to a base that is still",
 }
-_TASK = ("robot", "task", "path", "target", "load", "grasp_time", "limits", "constraints", "hold")
-_MOST_ROWS = 30
+_TABLES = ("terms_finer", "constraints", "mujoco")
+"""Parts of a verification that have tables of their own."""
 
 
 def run_report(path: str | Path, figures: Sequence[Path]) -> str:
@@ -44,8 +48,8 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         verdict(summary["result"]),
         section("The motion", motion(lambda: replays_of(folder.path), name)),
         section("The task", _task(config, folder)),
-        section("The result", _result(summary)),
-        section("Verification", _verification(summary["verification"])),
+        section("The result", _result(summary, config)),
+        section("Verification", _verification(summary)),
         section("Figures", figures_block(figures)),
         section("How it was made", made(summary, f"jffsr run {folder.config.name}")),
     ]
@@ -89,34 +93,50 @@ def motion(find: Callable[[], Sequence[Replay]], name: str) -> str:
 
 
 def _task(config: Mapping[str, Any], folder: RunFolder) -> str:
-    wanted = {key: config[key] for key in _TASK if config.get(key) not in (None, {}, [])}
-    rows = list(flattened(wanted))
     text = escape(folder.config.read_text(encoding="utf-8"))
     whole = f"<details><summary>The whole configuration</summary><pre>{text}</pre></details>"
-    return table(("", ""), rows[:_MOST_ROWS]) + whole
+    return task_tables(build_robot(folder.read_config()), config) + whole
 
 
-def _result(summary: Mapping[str, Any]) -> str:
-    parts = [terms_table(summary.get("terms") or {}, summary["verification"].get("terms_finer", {}))]
+def _result(summary: Mapping[str, Any], config: Mapping[str, Any]) -> str:
+    terms = summary.get("terms") or {}
+    finer = summary["verification"].get("terms_finer", {})
+    parts = [terms_table(terms, finer, scales(config.get("objective") or {}, terms))]
     parts += [compared(summary[what]) for what in ("trackers", "runs") if summary.get(what)]
     printed = f"<pre>{escape(summary_text(dict(summary)))}</pre>"
     return "\n".join(part for part in [*parts, printed] if part)
 
 
-def _verification(found: Mapping[str, Any]) -> str:
+def scales(objective: Mapping[str, Any], terms: Iterable[str]) -> dict[str, str]:
+    """Which value of each term counts 1, with its unit, by the section `objective` of a configuration."""
+    found = {}
+    for name in terms:
+        section = objective.get(name)
+        if not isinstance(section, Mapping):
+            continue
+        if section.get("scale_deg") is not None:
+            found[name] = f"{section['scale_deg']:g} deg"
+        elif section.get("scale") is not None:
+            unit = term_unit(name)
+            found[name] = f"{section['scale']:g}" + (f" {unit}" if unit != NO_UNIT else "")
+    return found
+
+
+def _verification(summary: Mapping[str, Any]) -> str:
     """What the finer re-run and the other simulators found; the terms have a table of their own."""
-    simulators = found.get("mujoco")
-    rest = {key: value for key, value in found.items() if key not in ("terms_finer", "mujoco")}
-    if simulators is None:
-        return measured(rest)
-    lines = [
-        line
-        for part in simulators.values()
-        if isinstance(part, list)
-        for line in part
-        if isinstance(line, dict)
+    found = summary["verification"]
+    rest = {key: value for key, value in found.items() if key not in _TABLES}
+    if "cost_finer" in rest:
+        rest = {"index J at the finer re-run": rest.pop("cost_finer")} | rest
+    if summary["kind"] == "tracking" and "momentum_drift" in rest:
+        rest["momentum_drift_relative"] = rest.pop("momentum_drift")
+    constraints = [
+        (name.replace("_", " "), part["violation"], part["tolerance"])
+        for name, part in (found.get("constraints") or {}).items()
     ]
-    columns = list(dict.fromkeys(key for line in lines for key in line))
-    rows = [[line.get(key) for key in columns] for line in lines]
-    words = f"<p>{escape(str(simulators.get('sentence', '')))}</p>"
-    return measured(rest) + words + table([key.replace("_", " ") for key in columns], rows)
+    simulators = found.get("mujoco")
+    return (
+        measured(rest)
+        + table(("constraint", "missed by", "allowed"), constraints)
+        + ("" if simulators is None else simulators_block(simulators))
+    )

@@ -1,20 +1,28 @@
-"""The report of a sweep: what was varied, the table, the rank tests, figures, and the best motions."""
+"""The report of a sweep: its best setting, what was varied and fixed, what was found, and the best motions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
-
-import yaml
+from typing import Any
 
 from jffsr.errors import InputError
+from jffsr.study.building import build_robot
+from jffsr.study.dataset import open_dataset
+from jffsr.study.schema import PlanningConfig
+from jffsr.study.sweep.ended import read_ended
 from jffsr.study.sweep.folder import SweepFolder
+from jffsr.study.sweep.points import expand
+from jffsr.study.sweep.specification import read_sweep
+from jffsr.study.sweep.table import keys_of
 from jffsr.viz.replay.of_sweep import sweep_replays
 from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
 from jffsr.viz.report.report import made, motion, section, verdict
+from jffsr.viz.report.sweep_findings import best_setting, binding_table, short_points, varied_table
 from jffsr.viz.report.tables import flattened, table
+from jffsr.viz.report.task import is_varied, other_table, shows, task_tables
 
 _BEST = (
     "<p>The best point of each of the settings that cost least, computed again from what the sweep kept.</p>"
@@ -22,31 +30,52 @@ _BEST = (
 
 
 def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
-    """The report of a finished sweep as an HTML document; figures are files of its pictures.
+    """The report of a sweep that came to its end as an HTML document; figures are files of its pictures.
 
-    Raises InputError where the folder holds no finished sweep, or viser is not installed.
+    Raises InputError where the folder holds no such sweep, or viser is not installed.
     """
     folder = SweepFolder(Path(path))
-    summary = folder.read_summary()
+    summary = read_ended(path)
     try:
         found = folder.table.read_text(encoding="utf-8")
         text = folder.config.read_text(encoding="utf-8")
+        dataset = open_dataset(folder.result)
     except OSError as error:
         raise InputError(f"{folder.path}: cannot be read ({error.strerror or error})") from None
-    name = str(summary["name"])
+    name, first = str(summary["name"]), expand(read_sweep(str(folder.config)))[0].config
+    varied = keys_of(dataset, seeds=True)
+    robot = "" if "robot" in varied else f" &middot; robot {escape(first.robot)}"
     whole = f"<details><summary>The whole configuration</summary><pre>{escape(text)}</pre></details>"
-    varied = {key: value for key, value in yaml.safe_load(text).items() if key != "base"}
     parts = [
         f"<h1>{escape(name)}</h1>",
-        '<p class="kind">A sweep of plans</p>',
+        f'<p class="kind">A sweep of plans{robot}</p>',
         verdict(summary["result"]),
-        section("What was varied", table(("", ""), list(flattened(varied))) + whole),
+        best_setting(dataset),
+        section("What was varied", varied_table(dataset)),
+        section("What was fixed", fixed(first, varied) + whole),
         section("What was found", from_markdown(found)),
+        section("What binds", binding_table(dataset)),
+        section("Points that fell short", short_points(dataset)),
         section("Figures", figures_block(figures)),
         section("The best motions", _BEST + motion(lambda: sweep_replays(folder.path), name)),
         section("How it was made", made(summary, f"jffsr sweep {folder.config.name}")),
     ]
     return page(name, "\n".join(part for part in parts if part))
+
+
+def fixed(config: PlanningConfig, varied: Sequence[str]) -> str:
+    """What all points of a sweep share: the joints' start, goal and limits, the task, and folded away all the rest."""
+    values = _plain(config.model_dump())
+    shown = (
+        other_table(values, varied) if "robot" in varied else task_tables(build_robot(config), values, varied)
+    )
+    rest = [
+        (key, value)
+        for key, value in flattened(values)
+        if not shows(key) and not is_varied(key, varied) and key not in ("kind", "name")
+    ]
+    more = table(("", ""), rest)
+    return f"{shown}<details><summary>Everything else that was fixed</summary>{more}</details>"
 
 
 def from_markdown(text: str) -> str:
@@ -60,6 +89,15 @@ def from_markdown(text: str) -> str:
         else:
             parts.append(f"<p>{escape(block.lstrip('# '))}</p>")
     return "\n".join(parts)
+
+
+def _plain(value: Any) -> Any:
+    """Mappings and lists all the way down, as YAML would have them."""
+    if isinstance(value, Mapping):
+        return {key: _plain(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    return value
 
 
 def _value(cell: str) -> str | float | int:

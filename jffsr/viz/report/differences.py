@@ -1,0 +1,101 @@
+"""Several runs beside each other: in what their configurations differ, and what came of each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from jffsr.errors import InputError
+from jffsr.study.run_folder import RunFolder
+from jffsr.viz.report.tables import flattened, head, number, table
+from jffsr.viz.report.units import NO_UNIT
+
+_NUMBERS = {
+    "cost": "index J",
+    "duration": "duration [s]",
+    "evaluations.objective": "evaluations",
+    "evaluations.gradient": "gradients",
+    "seconds.total": "seconds in all [s]",
+}
+"""Numbers that a summary of any kind may have, by their keys in it."""
+_PARTS = ("grasp_error", "approach", "contact", "hold", "verification")
+_SKIPPED = ("mujoco", "terms_finer", "constraints", "trackers", "runs")
+_LONGEST = 160
+"""Letters of a configuration's value that a cell shows."""
+
+
+class RunRead:
+    """What a comparison reads of a finished run or sweep: what it is called, its configuration and its summary."""
+
+    def __init__(self, path: str | Path, name: str, summary: Mapping[str, Any]):
+        folder = RunFolder(Path(path))
+        self.name, self.summary = name, summary
+        try:
+            config = yaml.safe_load(folder.config.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise InputError(f"{folder.config}: cannot be read ({error})") from None
+        self.config = dict(flattened(config)) if isinstance(config, Mapping) else {}
+
+
+def differences(runs: Sequence[RunRead]) -> str:
+    """The configuration's keys in which the runs differ, a column for each run."""
+    keys = dict.fromkeys(key for run in runs for key in run.config)
+    rows = []
+    for key in keys:
+        values = [run.config.get(key) for run in runs]
+        if len({json.dumps(value, default=str) for value in values}) > 1:
+            rows.append((key, *map(_shown, values)))
+    if not rows:
+        return "<p>Their configurations are the same.</p>"
+    words = f"<p>{NO_UNIT} is null, empty or not given; all other keys are the same.</p>"
+    return table(("key", *(run.name for run in runs)), rows) + words
+
+
+def results(runs: Sequence[RunRead]) -> str:
+    """What came of each run: its sentence, J, its terms, its cost in evaluations and time, and its verification."""
+    columns = [_numbers(run.summary) for run in runs]
+    keys = dict.fromkeys(key for column in columns for key in column)
+    rows = [(key, *(column.get(key, NO_UNIT) for column in columns)) for key in keys]
+    return table(("", *(run.name for run in runs)), rows)
+
+
+def compared_runs(runs: Sequence[RunRead], curves: str) -> str:
+    """All of a comparison as a piece of a page; curves are those drawn together."""
+    parts = {
+        "In what they differ": differences(runs),
+        "What came of them": results(runs),
+        "Their curves together": curves,
+    }
+    return "\n".join(f"<h2>{escape(title)}</h2>\n{part}" for title, part in parts.items() if part)
+
+
+def _shown(value: Any) -> Any:
+    if value is None:
+        return NO_UNIT
+    text = number(value)
+    if isinstance(value, (bool, int, float)):
+        return value
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def _numbers(summary: Mapping[str, Any]) -> dict[str, Any]:
+    """The rows of one run by what they are called."""
+    flat = dict(flattened(summary))
+    found: dict[str, Any] = {"result": summary["result"]["sentence"], "robot": summary.get("robot", NO_UNIT)}
+    found |= {title: flat[key] for key, title in _NUMBERS.items() if key in flat}
+    for name, term in (summary.get("terms") or {}).items():
+        found[f"term {name.replace('_', ' ')}, weighted"] = term["weighted"]
+    for part in _PARTS:
+        section = summary.get(part) or {}
+        plain = {key: value for key, value in section.items() if key not in _SKIPPED}
+        found |= {
+            head(f"{part}.{key}" if part != "verification" else key): value
+            for key, value in flattened(plain)
+            if isinstance(value, (int, float)) and key != "code"
+        }
+    return found
