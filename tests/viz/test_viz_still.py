@@ -7,8 +7,9 @@ import pytest
 
 from jffsr import cli
 from jffsr.errors import InputError
-from jffsr.robots.geometry import Shape
+from jffsr.robots.geometry import Geometry, Shape
 from jffsr.robots.loading import list_robots
+from jffsr.viz.replay.bodies import bare_parts
 from jffsr.viz.robot import draw_still, solids_of
 from jffsr.viz.scene import scene_at
 from jffsr.viz.solids import outward, refined, shape_faces
@@ -148,18 +149,38 @@ def test_a_folded_arm_is_opened_and_an_open_one_left_as_it_is(robots, stills):
     assert opened > 9
 
 
-def test_a_robot_without_shapes_is_its_box_and_capsules(robots):
+def test_a_robot_without_shapes_is_its_box_and_round_links(robots):
     robot = robots["two_arms"]
     assert not robot.geometry.shapes
     scene = scene_at(robot, np.zeros((1, robot.num_joints)))
-    solids = solids_of(robot, scene, 0)
-    np.testing.assert_array_equal(solids[0][0], scene.base_faces[0])
-    ends = scene.segments[0].reshape(-1, 3)
-    for faces, *_ in solids[1:]:
-        # A capsule's middle is the middle of some link's line.
-        middle = 0.5 * (faces.reshape(-1, 3).min(axis=0) + faces.reshape(-1, 3).max(axis=0))
-        halves = 0.5 * (ends[0::2] + ends[1::2])
-        assert np.linalg.norm(halves - middle, axis=1).min() < 1e-9
+    solids = [faces for faces, *_ in solids_of(robot, scene, 0)]
+    np.testing.assert_allclose(solids[0], scene.base_faces[0], atol=1e-12)
+    middles = [0.5 * (f.reshape(-1, 3).min(axis=0) + f.reshape(-1, 3).max(axis=0)) for f in solids[1:]]
+
+    def drawn_around(points):
+        return [np.linalg.norm(np.subtract(middles, point), axis=1).min() < 1e-9 for point in points]
+
+    # A tube's middle is that of a link's line; a housing's is its joint, a disc's its tool.
+    starts, ends = np.moveaxis(scene.segments[0], 1, 0)
+    long = np.linalg.norm(ends - starts, axis=1) > 0
+    assert all(drawn_around(0.5 * (starts + ends)[long]))
+    assert all(drawn_around(scene.joints[0]))
+    assert all(drawn_around(scene.tools[0]))
+    assert len(middles) == long.sum() + robot.num_joints + len(scene.tools[0])
+
+
+def test_a_heavier_link_without_shapes_is_thicker(robots):
+    robot = robots["servicer_7dof"].replace(geometry=Geometry(()))
+
+    def thickness(heavy):
+        inertia = np.array(robot.inertia)
+        inertia[3] = heavy * inertia[3]
+        changed = robot.replace(inertia=inertia)
+        scene = scene_at(changed, np.zeros((1, robot.num_joints)))
+        (link,) = [part for part in bare_parts(changed, scene) if part.name == f"{robot.body_names[3]} link"]
+        return np.sort(np.ptp(link.faces.reshape(-1, 3), axis=0))[0]
+
+    assert thickness(4.0) > 1.2 * thickness(0.25)
 
 
 @pytest.mark.parametrize("posture", [[0.0, 0.0, 0.0], [np.nan, 0.0]])

@@ -64,9 +64,21 @@ def with_one_scale(replays: Sequence[Replay]) -> list[Replay]:
     return [replace(replay, arrows=tuple(map(scaled, replay.arrows))) for replay in replays]
 
 
+def _by_line(replays: Sequence[Replay]) -> dict[str, list[str]]:
+    """Every sentence of the replays' legends, with the titles of those that it is said of."""
+    found: dict[str, list[str]] = {}
+    for replay in replays:
+        for line in dict.fromkeys(replay.legend):
+            found.setdefault(line, []).append(replay.title)
+    return found
+
+
 def legend_of(replays: Sequence[Replay]) -> list[str]:
     """What there is to know of replays that are seen together, in sentences."""
-    lines = list(dict.fromkeys(line for replay in replays for line in replay.legend))
+    lines = [
+        line if len(named) == len(replays) else f"{', '.join(named)}: {line}"
+        for line, named in _by_line(replays).items()
+    ]
     arrows = [arrow for replay in replays for arrow in replay.arrows if arrow.name.startswith(_MOMENTUM)]
     if arrows:
         largest = max(arrow.scale * np.linalg.norm(arrow.vector, axis=1).max() for arrow in arrows)

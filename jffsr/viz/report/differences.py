@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from jffsr.viz.report.units import NO_UNIT
 
 _NUMBERS = {
     "cost": "index J",
+    "verification.cost_finer": "index J at the finer re-run",
     "duration": "duration [s]",
     "evaluations.objective": "evaluations",
     "evaluations.gradient": "gradients",
@@ -44,24 +45,38 @@ class RunRead:
 
 def differences(runs: Sequence[RunRead]) -> str:
     """The configuration's keys in which the runs differ, a column for each run."""
-    keys = dict.fromkeys(key for run in runs for key in run.config)
     rows = []
-    for key in keys:
+    for key in _in_sections(key for run in runs for key in run.config):
         values = [run.config.get(key) for run in runs]
         if len({json.dumps(value, default=str) for value in values}) > 1:
             rows.append((key, *map(_shown, values)))
     if not rows:
         return "<p>Their configurations are the same.</p>"
     words = f"<p>{NO_UNIT} is null, empty or not given; all other keys are the same.</p>"
-    return table(("key", *(run.name for run in runs)), rows) + words
+    return _beside("key", runs, rows) + words
 
 
 def results(runs: Sequence[RunRead]) -> str:
     """What came of each run: its sentence, J, its terms, its cost in evaluations and time, and its verification."""
     columns = [_numbers(run.summary) for run in runs]
-    keys = dict.fromkeys(key for column in columns for key in column)
-    rows = [(key, *(column.get(key, NO_UNIT) for column in columns)) for key in keys]
-    return table(("", *(run.name for run in runs)), rows)
+    keys = _in_sections(key for column in columns for key in column)
+    rows = [
+        (_title(key), *(column.get(key, NO_UNIT) for column in columns))
+        for key in keys
+        if any(column.get(key) is not None for column in columns)
+    ]
+    return _beside("", runs, rows)
+
+
+def _beside(first: str, runs: Sequence[RunRead], rows: Sequence[Sequence[Any]]) -> str:
+    return f'<div class="runs">{table((first, *(run.name for run in runs)), rows)}</div>'
+
+
+def _in_sections(keys: Iterable[str]) -> list[str]:
+    """Keys without repetition, those of one section together, sections and keys in the order of their first use."""
+    distinct = {key: key if key in _NUMBERS else key.partition(".")[0] for key in keys}
+    sections = list(dict.fromkeys(distinct.values()))
+    return sorted(distinct, key=lambda key: sections.index(distinct[key]))
 
 
 def compared_runs(runs: Sequence[RunRead], curves: str) -> str:
@@ -84,18 +99,25 @@ def _shown(value: Any) -> Any:
 
 
 def _numbers(summary: Mapping[str, Any]) -> dict[str, Any]:
-    """The rows of one run by what they are called."""
+    """The numbers of one run by their keys in its summary, its sentence before them."""
+    found: dict[str, Any] = {"result": summary["result"]["sentence"], "robot": summary.get("robot")}
     flat = dict(flattened(summary))
-    found: dict[str, Any] = {"result": summary["result"]["sentence"], "robot": summary.get("robot", NO_UNIT)}
-    found |= {title: flat[key] for key, title in _NUMBERS.items() if key in flat}
-    for name, term in (summary.get("terms") or {}).items():
-        found[f"term {name.replace('_', ' ')}, weighted"] = term["weighted"]
+    found |= {key: flat[key] for key in _NUMBERS if key in flat}
+    found |= {f"terms.{name}": term["weighted"] for name, term in (summary.get("terms") or {}).items()}
     for part in _PARTS:
         section = summary.get(part) or {}
         plain = {key: value for key, value in section.items() if key not in _SKIPPED}
-        found |= {
-            head(f"{part}.{key}" if part != "verification" else key): value
-            for key, value in flattened(plain)
-            if isinstance(value, (int, float)) and key != "code"
-        }
+        for key, value in flattened(plain):
+            if isinstance(value, (int, float)) and key != "code":
+                found[f"{part}.{key}"] = value
     return found
+
+
+def _title(key: str) -> str:
+    """What a number of a summary is called, with its unit."""
+    if key in _NUMBERS:
+        return _NUMBERS[key]
+    part, _, name = key.partition(".")
+    if part == "terms":
+        return f"term {name.replace('_', ' ')}, weighted"
+    return head(name if part == "verification" else key)

@@ -134,9 +134,11 @@ def _verification(summary: Mapping[str, Any]) -> str:
         (name.replace("_", " "), part["violation"], part["tolerance"])
         for name, part in (found.get("constraints") or {}).items()
     ]
+    left = "<p>A negative overrun is the share of a limit that is left.</p>"
     simulators = found.get("mujoco")
     return (
         measured(rest)
+        + (left if "largest_overrun_relative" in rest else "")
         + table(("constraint", "missed by", "allowed"), constraints)
         + ("" if simulators is None else simulators_block(simulators))
     )

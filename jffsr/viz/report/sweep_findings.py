@@ -33,7 +33,7 @@ def varied_table(dataset: Dataset) -> str:
         shown = ", ".join(number(value) for value in values[:_MOST_VALUES])
         more = f" and {len(values) - _MOST_VALUES} more" if len(values) > _MOST_VALUES else ""
         rows.append((key, len(values), shown + more, _unit(dataset, key)))
-    return table(("key", "values", "", "unit"), rows)
+    return table(("key", "how many", "values", "unit"), rows)
 
 
 def best_setting(dataset: Dataset) -> str:
@@ -52,10 +52,11 @@ def best_setting(dataset: Dataset) -> str:
     else:
         values = f"J at best {cost:.4g}, median {_median(best.cost):.4g}"
         found = f"accuracy{asked} met by {met} of its {count} runs, {values}"
+    whole = sum(bool(np.all(row.code == ResultCode.ACCURACY_MET)) for row in rows)
     return (
         f'<p class="verdict {"met" if met else "missed"}">Best setting: {escape(_values(best, dataset))}: {found}.</p>'
         "<p>That is the setting most of whose runs met their accuracy, and among equals the one with the least "
-        "median J.</p>"
+        f"median J. Of {len(rows)} settings {whole} met it in every run.</p>"
     )
 
 
