@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 _TARGET_POINT = (0.75, 0.55, 0.20)
+_TRUE_POINT = (0.20, 0.60, 0.35)
 _CLOSE = 0.2
 """m beyond the margin, from where on bodies count as near each other."""
 
@@ -31,19 +32,19 @@ def capture_extras(robot: Robot, geometry: Geometry, dataset: Dataset) -> Extras
     )
     extras.ways = (Way("grasp point's way", dataset["grasp_position"].values, _TARGET_POINT),)
     extras.axes = (("grasp frame", dataset["grasp_position"].values, dataset["grasp_quaternion"].values),)
-    error = dataset["grasp_error"].values
-    extras.panels = (
-        Panel(
-            "tool from the grasp",
-            "m, rad",
-            time,
-            {
-                "position": positive(np.linalg.norm(error[:, :3], axis=1)),
-                "attitude": positive(np.linalg.norm(error[:, 3:6], axis=1)),
-            },
-            logarithmic=True,
-        ),
-    )
+    curves = _off(dataset["grasp_error"].values)
+    words: tuple[str, ...] = ()
+    if "true_grasp_error" in dataset:
+        curves = {f"{name}, predicted": values for name, values in curves.items()}
+        curves |= {
+            f"{name}, true": values for name, values in _off(dataset["true_grasp_error"].values).items()
+        }
+        extras.ways += (Way("true grasp point's way", dataset["true_grasp_position"].values, _TRUE_POINT),)
+        words = (
+            "The target is where it really is; the grasp frame, and the yellow way, are where the filter predicts it, "
+            "the green way is the true grasp point's.",
+        )
+    extras.panels = (Panel("tool from the grasp", "m, rad", time, curves, logarithmic=True),)
     if "clearance" in dataset:
         margin = float(dataset.attrs.get("margin", 0.0))
         apart, pairs = dataset["clearance"].values, [str(pair) for pair in dataset["pair"].values]
@@ -54,14 +55,23 @@ def capture_extras(robot: Robot, geometry: Geometry, dataset: Dataset) -> Extras
             own = [number for number, pair in enumerate(pairs) if body in pair.split(" and ")]
             if own:
                 extras.nearness[body] = near[own].max(axis=0)
-        extras.legend = (
+        words += (
             f"Bodies and target show how near they come to each other: red at {margin:g} m, the margin between them.",
         )
         if "target" in extras.nearness:
             extras.solids = tuple(
                 replace(solid, nearness=extras.nearness["target"]) for solid in extras.solids
             )
+    extras.legend = words
     return extras
+
+
+def _off(error: np.ndarray) -> dict[str, np.ndarray]:
+    """Lengths over time of an error (N, 12) of the tool's pose: position, m, and attitude, rad."""
+    return {
+        "position": positive(np.linalg.norm(error[:, :3], axis=1)),
+        "attitude": positive(np.linalg.norm(error[:, 3:6], axis=1)),
+    }
 
 
 def target_solids(geometry: Geometry, position: np.ndarray, quaternion: np.ndarray) -> tuple[Solid, ...]:
