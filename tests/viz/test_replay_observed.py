@@ -49,7 +49,9 @@ def observed(tmp_path_factory):
         "grasp": "handle",
         "grasp_time": {"sentence": "grasp 'handle' at 20 s"},
         "duration": 20.0,
-        "grasp_error": dict.fromkeys(("position_m", "attitude_rad", "linear_velocity_m_s", "angular_velocity_rad_s"), 0.0),
+        "grasp_error": dict.fromkeys(
+            ("position_m", "attitude_rad", "linear_velocity_m_s", "angular_velocity_rad_s"), 0.0
+        ),
         "attempts": 1,
         "evaluations": {"objective": 0, "gradient": 5},
         "seconds": {"total": 1.0, "compile": 0.5},

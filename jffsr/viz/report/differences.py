@@ -12,7 +12,7 @@ import yaml
 
 from jffsr.errors import InputError
 from jffsr.study.run_folder import RunFolder
-from jffsr.viz.report.tables import flattened, head, number, table
+from jffsr.viz.report.tables import OVERRUNS, flattened, head, number, table
 from jffsr.viz.report.units import NO_UNIT
 
 _NUMBERS = {
@@ -65,7 +65,8 @@ def results(runs: Sequence[RunRead]) -> str:
         for key in keys
         if any(column.get(key) is not None for column in columns)
     ]
-    return _beside("", runs, rows)
+    has_overruns = any("overrun" in key for key in keys)
+    return _beside("", runs, rows) + (OVERRUNS if has_overruns else "")
 
 
 def _beside(first: str, runs: Sequence[RunRead], rows: Sequence[Sequence[Any]]) -> str:

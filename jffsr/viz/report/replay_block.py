@@ -58,7 +58,9 @@ def replay_block(replays: Sequence[Replay], title: str) -> str:
 
 def _states(replays: Sequence[Replay]) -> str:
     """The colours of what comes near a limit; nothing where nothing has one."""
-    if all(solid.nearness is None for replay in replays for solid in replay.solids):
+    near = (solid.nearness for replay in replays for solid in replay.solids)
+    # Of a part without a limit it is zero throughout.
+    if not any(values is not None and np.any(values) for values in near):
         return ""
     keys = "; ".join(f"{_swatch(colour)}{escape(meaning)}" for colour, meaning in STATES)
     return f"<li>Colours: a part's own up to 70 % of its limit; {keys}.</li>"

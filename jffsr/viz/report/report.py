@@ -18,7 +18,7 @@ from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
 from jffsr.viz.report.replay_block import replay_block
 from jffsr.viz.report.simulators import simulators_block
-from jffsr.viz.report.tables import compared, measured, table, terms_table
+from jffsr.viz.report.tables import OVERRUNS, compared, measured, table, terms_table
 from jffsr.viz.report.task import task_tables
 from jffsr.viz.report.units import NO_UNIT, term_unit
 
@@ -134,11 +134,10 @@ def _verification(summary: Mapping[str, Any]) -> str:
         (name.replace("_", " "), part["violation"], part["tolerance"])
         for name, part in (found.get("constraints") or {}).items()
     ]
-    left = "<p>A negative overrun is the share of a limit that is left.</p>"
     simulators = found.get("mujoco")
     return (
         measured(rest)
-        + (left if "largest_overrun_relative" in rest else "")
+        + (OVERRUNS if "largest_overrun_relative" in rest else "")
         + table(("constraint", "missed by", "allowed"), constraints)
         + ("" if simulators is None else simulators_block(simulators))
     )

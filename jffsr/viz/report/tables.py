@@ -10,6 +10,9 @@ from jffsr.viz.report.units import NO_UNIT, name_and_unit, term_unit
 
 _LONGEST = 12
 """Numbers of a list that a cell shows."""
+_WORDS = 50
+"""Letters from which on a cell is a sentence, which needs some width."""
+OVERRUNS = "<p>A negative overrun is the share of a limit that is left.</p>"
 _FINER = (
     "The planner works with the values at its own step; the last column has them from a re-run at a finer step, "
     "and by those the plan is judged."
@@ -121,5 +124,7 @@ def _plain(part: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _cell(value: Any) -> str:
-    kind = ' class="number"' if isinstance(value, (int, float)) and not isinstance(value, bool) else ""
-    return f"<td{kind}>{escape(number(value))}</td>"
+    text = number(value)
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    kind = ' class="number"' if is_number else ' class="words"' if len(text) > _WORDS else ""
+    return f"<td{kind}>{escape(text)}</td>"
