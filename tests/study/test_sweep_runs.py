@@ -17,6 +17,7 @@ from jffsr import cli
 from jffsr.planning import many
 from jffsr.study.dataset import open_dataset
 from jffsr.study.sweep import local, running
+from jffsr.study.sweep.ended import read_ended
 from jffsr.study.sweep.points import expand
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.tasks import sort_into_tasks
@@ -249,9 +250,12 @@ def test_a_call_that_fails_takes_no_other_with_it(base, finished, tmp_path, monk
         patch.setattr(local, "run_task", fail_at_the_second)
         assert sweep(base, *SWEPT, out=folder) == cli.DEFECT
     assert "points 4 to 7 (4 of them): MemoryError: no memory for that" in capsys.readouterr().err
-    np.testing.assert_array_equal(
-        open_dataset(folder / "sweep.nc")["code"].values == -1, np.arange(12) // 4 == 1
-    )
+    dataset = open_dataset(folder / "sweep.nc")
+    np.testing.assert_array_equal(dataset["code"].values == -1, np.arange(12) // 4 == 1)
+    assert set(dataset["failure"].values[4:8]) == {"MemoryError: no memory for that"}
+    told = read_ended(folder)
+    assert told["failures"] == ["points 4, 5, 6, 7: MemoryError: no memory for that"]
+    assert told["result"]["sentence"].endswith("4 could not be computed")
     assert sweep(base, *SWEPT, out=folder) == cli.NOT_MET
     assert (folder / "sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
 

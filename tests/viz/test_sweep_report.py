@@ -114,6 +114,16 @@ def test_points_that_fell_short_say_why():
     assert short_points(dataset.isel(point=[2, 5])) == ""
 
 
+def test_keys_with_texts_are_shown_as_they_are():
+    dataset = merged_sweep()
+    dataset["optimizer.kind"] = ("point", np.array(["qpso", "hybrid"] * 3, dtype=object))
+    dataset.attrs["swept_keys"] = json.dumps(["task.duration", "optimizer.kind"])
+    assert columns_of(tables_of(short_points(dataset))[0])["optimizer.kind"] == ["qpso", "qpso", "hybrid"]
+    assert "task.duration = 40 s, optimizer.kind = hybrid: J 0.001, accuracy" in best_setting(dataset)
+    assert columns_of(tables_of(binding_table(dataset))[0])["optimizer.kind"] == ["qpso", "hybrid"] * 3
+    assert ["optimizer.kind", "2", "qpso, hybrid", ""] in tables_of(varied_table(dataset))[0]
+
+
 def test_a_sweep_from_before_reasons_were_kept_says_so():
     assert failures_of(merged_sweep()) == {4: "not recorded"}
 

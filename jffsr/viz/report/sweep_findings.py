@@ -91,13 +91,14 @@ def short_points(dataset: Dataset) -> str:
     if not len(missed):
         return ""
     keys = keys_of(dataset, seeds=True)
+    columns = [dataset[key].values.tolist() for key in keys]
     # Those that could not be computed first: something is wrong with them.
     ordered = sorted(missed.tolist(), key=lambda point: (code[point] != MISSING, point))
     cost = ranked_cost(dataset)
     rows = [
         (
             point,
-            *(dataset[key].values[point].item() for key in keys),
+            *(column[point] for column in columns),
             float(cost[point]) if np.isfinite(cost[point]) else None,
             failed[point] if point in failed else _why(dataset, point),
         )
