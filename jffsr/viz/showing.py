@@ -114,13 +114,13 @@ def _replays(path: str | Path) -> list[Replay]:
 
 
 def _comparison(paths: Sequence[str | Path], replays: Sequence[Replay]) -> str:
-    from jffsr.viz.report.differences import RunRead, compared_runs
+    from jffsr.viz.report.differences import compared_runs, read_run
     from jffsr.viz.report.together import curves_together
 
     if len(paths) < 2:
         return ""
     names = _names(paths)
-    runs = [RunRead(path, name, read_summary(path)) for path, name in zip(paths, names, strict=True)]
+    runs = [read_run(path, name, read_summary(path)) for path, name in zip(paths, names, strict=True)]
     return compared_runs(runs, curves_together(replays))
 
 

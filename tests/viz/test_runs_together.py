@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from made_replays import boxes_replay
 from page_tables import columns_of, tables_of
 
 from jffsr.errors import InputError
+from jffsr.study.config import dump_config, load_config
 from jffsr.viz.replay.replay import Panel
-from jffsr.viz.report.differences import RunRead, compared_runs, differences, results
+from jffsr.viz.report.differences import compared_runs, differences, read_run, results
 from jffsr.viz.report.page import replay_page
 from jffsr.viz.report.together import curves_together
 from jffsr.viz.style import level_look
@@ -24,6 +26,20 @@ robot: wu_6dof
 task: {duration: DURATION, start_deg: [1.0, 2.0]}
 optimizer: {kind: KIND}
 path: {poses: [{position: [0, 0, LAST]}]}
+"""
+
+
+SWEEP = """\
+kind: sweep
+name: durations
+base:
+  kind: planning
+  name: plan
+  robot: wu_6dof
+  task: {start_deg: [175, -60, -60, 0, 210, 5], goal_deg: [120, -30, -95, 40, 170, 60], duration: 30}
+grid:
+  task.duration: [20, 30]
+seeds: [0, 1]
 """
 
 
@@ -44,7 +60,7 @@ def read(folder, name, cost=2.0, duration="30", kind="hybrid", last="1", **more)
     (folder / name).mkdir()
     text = CONFIG.replace("DURATION", duration).replace("KIND", kind).replace("LAST", last)
     (folder / name / "config.yaml").write_text(text)
-    return RunRead(folder / name, name, summary(cost) | more)
+    return read_run(folder / name, name, summary(cost) | more)
 
 
 def test_only_the_keys_that_differ_are_shown(tmp_path):
@@ -53,6 +69,23 @@ def test_only_the_keys_that_differ_are_shown(tmp_path):
     assert table[0] == ["key", "a", "b"]
     assert table[1:] == [["task.duration", "30", "–"], ["path.poses.1.position", "0, 0, 1", "0, 0, 2"]]
     assert tables_of(differences([runs[0], read(tmp_path, "c")])) == []
+
+
+def test_a_sweep_has_all_values_of_the_keys_that_it_sets(tmp_path):
+    (tmp_path / "s").mkdir()
+    (tmp_path / "s" / "config.yaml").write_text(SWEEP)
+    sweep = read_run(tmp_path / "s", "s", {"kind": "sweep", "result": {"sentence": "1 of 4"}})
+    (tmp_path / "a").mkdir()
+    own = tmp_path / "own.yaml"
+    own.write_text(yaml.safe_dump(yaml.safe_load(SWEEP)["base"]))
+    (tmp_path / "a" / "config.yaml").write_text(dump_config(load_config(own)))
+    run = read_run(tmp_path / "a", "a", summary(2.0))
+    rows = tables_of(differences([sweep, run]))[0][1:]
+    assert [row for row in rows if row[0] != "name"] == [
+        ["task.duration", "20, 30", "30"],
+        ["seed", "0, 1", "0"],
+    ]
+    assert tables_of(results([sweep, run]))[0][1] == ["result", "1 of 4", "J = 2.0"]
 
 
 def test_a_number_and_a_text_like_it_differ(tmp_path):
@@ -76,7 +109,7 @@ def test_what_came_of_runs_stands_side_by_side(tmp_path):
 def test_a_configuration_that_cannot_be_read_is_said_to_be(tmp_path):
     (tmp_path / "config.yaml").write_text("{")
     with pytest.raises(InputError, match="cannot be read"):
-        RunRead(tmp_path, "a", summary(1.0))
+        read_run(tmp_path, "a", summary(1.0))
 
 
 def moved(title: str, end: float, **panels: Panel):

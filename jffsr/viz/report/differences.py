@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,9 @@ import yaml
 
 from jffsr.errors import InputError
 from jffsr.study.run_folder import RunFolder
+from jffsr.study.sweep.merging import swept_keys
+from jffsr.study.sweep.points import expand, value_text
+from jffsr.study.sweep.specification import read_sweep
 from jffsr.viz.report.tables import OVERRUNS, flattened, head, number, table
 from jffsr.viz.report.units import NO_UNIT
 
@@ -30,17 +34,36 @@ _LONGEST = 160
 """Letters of a configuration's value that a cell shows."""
 
 
+@dataclass(frozen=True)
 class RunRead:
-    """What a comparison reads of a finished run or sweep: what it is called, its configuration and its summary."""
+    """What a comparison needs of a finished run or sweep.
 
-    def __init__(self, path: str | Path, name: str, summary: Mapping[str, Any]):
-        folder = RunFolder(Path(path))
-        self.name, self.summary = name, summary
-        try:
-            config = yaml.safe_load(folder.config.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise InputError(f"{folder.config}: cannot be read ({error})") from None
-        self.config = dict(flattened(config)) if isinstance(config, Mapping) else {}
+    name: what it is called; config: its configuration's values by their keys written with dots; summary: what
+    summary.json holds.
+    """
+
+    name: str
+    config: Mapping[str, Any]
+    summary: Mapping[str, Any]
+
+
+def read_run(path: str | Path, name: str, summary: Mapping[str, Any]) -> RunRead:
+    """A finished run or sweep from its folder; of a sweep, keys that it sets have all their values.
+
+    Raises InputError where its configuration cannot be read.
+    """
+    folder = RunFolder(Path(path))
+    if summary["kind"] == "sweep":
+        points = expand(read_sweep(str(folder.config)))
+        config = dict(flattened(points[0].config.model_dump()))
+        for key in swept_keys(points):
+            config[key] = list(dict.fromkeys(value_text(p.values[key]) for p in points if key in p.values))
+        return RunRead(name, config, summary)
+    try:
+        found = yaml.safe_load(folder.config.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise InputError(f"{folder.config}: cannot be read ({error})") from None
+    return RunRead(name, dict(flattened(found)) if isinstance(found, Mapping) else {}, summary)
 
 
 def differences(runs: Sequence[RunRead]) -> str:
@@ -61,7 +84,7 @@ def results(runs: Sequence[RunRead]) -> str:
     columns = [_numbers(run.summary) for run in runs]
     keys = _in_sections(key for column in columns for key in column)
     rows = [
-        (_title(key), *(column.get(key, NO_UNIT) for column in columns))
+        (_title(key), *(NO_UNIT if column.get(key) is None else column[key] for column in columns))
         for key in keys
         if any(column.get(key) is not None for column in columns)
     ]

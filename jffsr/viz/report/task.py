@@ -22,6 +22,7 @@ _OF_JOINTS = (
 )
 """Keys that the joints' table has in place of the other one."""
 _MOST_ROWS = 40
+"""Rows that are seen at once; the others are folded away."""
 _TURNS, _SLIDES = "turns", "slides"
 
 
@@ -72,9 +73,9 @@ def other_table(config: Mapping[str, Any], varied: Collection[str] = ()) -> str:
             continue
         name, unit = name_and_unit(key)
         rows.append((name.removeprefix("task, "), value, unit))
-    left = len(rows) - _MOST_ROWS
-    more = f"<p>{left} more are in the whole configuration below.</p>" if left > 0 else ""
-    return table(("", "", "unit"), rows[:_MOST_ROWS]) + more
+    heads, rest = ("", "", "unit"), rows[_MOST_ROWS:]
+    more = f"<details><summary>{len(rest)} more</summary>{table(heads, rest)}</details>" if rest else ""
+    return table(heads, rows[:_MOST_ROWS]) + more
 
 
 def shows(key: str) -> bool:
