@@ -61,7 +61,7 @@ def test_degrees_stay_degrees_and_what_a_sweep_sets_is_left_out(robots):
     config = {
         "robot": "wu_6dof",
         "task": task | {"linear_momentum": [0.0, 1.0, 0.0]},
-        "limits": {"rate": 0.1},
+        "limits": {"rate": {"joint2": 0.1}},
     }
     joints, others = tables_of(task_tables(robot, config, ["task.goal", "task.duration"]))
     assert "start [deg]" in joints[0]
@@ -72,6 +72,7 @@ def test_degrees_stay_degrees_and_what_a_sweep_sets_is_left_out(robots):
 @pytest.mark.parametrize(
     ("key", "name", "unit"),
     [
+        ("nearest_approach.1.time_s", "nearest approach, 1, time", "s"),
         ("grasp_error.linear_velocity_m_s", "grasp error, linear velocity", "m/s"),
         ("largest_overrun_relative.rate", "largest overrun, rate", "relative"),
         ("hold.rate", "hold, rate", "Hz"),
@@ -94,12 +95,12 @@ def test_terms_say_their_units_and_what_counts_one():
     terms = {
         "attitude_change": {"value": 0.1, "weighted": 57.3},
         "joint_rate": {"value": 0.02, "weighted": 2.0},
-        "own": {"value": 3.0, "weighted": 3.0},
+        "own": {"value": 3.0, "weighted": 3.0, "unit": "kg"},
     }
     objective = {"attitude_change": {"scale_deg": 0.1}, "joint_rate": {"scale": 0.01}, "terms": []}
     html = terms_table(terms, {"own": {"weighted": 3.5}}, scales(objective, terms))
     columns = columns_of(tables_of(html)[0])
-    assert columns["unit"] == ["rad", "relative", "–"]
+    assert columns["unit"] == ["rad", "relative", "kg"]
     assert columns["counts 1 at"] == ["0.1 deg", "0.01 relative", "–"]
     assert columns["weighted, finer re-run"] == ["", "", "3.5"]
     assert "finer step" in html.split("</table>")[1]

@@ -94,13 +94,19 @@ def test_a_number_and_a_text_like_it_differ(tmp_path):
 
 
 def test_what_came_of_runs_stands_side_by_side(tmp_path):
-    other = read(tmp_path, "b", cost=0.25, hold={"code": 3, "base_rate": 0.002, "sentence": "still"})
+    near = {
+        "nearest_approach": [{"sentence": "hand and base, 0.1 m at 3 s"}],
+        "base": {"final_turn_rad": 0.5},
+    }
+    other = read(tmp_path, "b", cost=0.25, **near, hold={"code": 3, "base_rate": 0.002, "sentence": "still"})
     columns = columns_of(tables_of(results([read(tmp_path, "a"), other]))[0])
     found = dict(zip(columns[""], zip(columns["a"], columns["b"], strict=True), strict=True))
     assert found["result"] == ("J = 2.0", "J = 0.25")
     assert found["index J"] == ("2", "0.25")
     assert found["term joint rate, weighted"] == ("1", "0.125")
     assert found["attitude difference [rad]"] == ("1e-07", "1e-07")
+    assert found["nearest approach, 1"] == ("–", "hand and base, 0.1 m at 3 s")
+    assert found["base, final turn [rad]"] == ("–", "0.5")
     # What only one of them has is missing in the other.
     assert found["hold, base rate [rad/s]"] == ("–", "0.002")
     assert not any("code" in name or "finer" in name for name in found)

@@ -28,7 +28,7 @@ _NUMBERS = {
     "seconds.total": "seconds in all [s]",
 }
 """Numbers that a summary of any kind may have, by their keys in it."""
-_PARTS = ("grasp_error", "approach", "contact", "hold", "verification")
+_PARTS = ("base", "grasp_error", "approach", "contact", "hold", "verification")
 _SKIPPED = ("mujoco", "terms_finer", "constraints", "trackers", "runs")
 _LONGEST = 160
 """Letters of a configuration's value that a cell shows."""
@@ -128,6 +128,8 @@ def _numbers(summary: Mapping[str, Any]) -> dict[str, Any]:
     flat = dict(flattened(summary))
     found |= {key: flat[key] for key in _NUMBERS if key in flat}
     found |= {f"terms.{name}": term["weighted"] for name, term in (summary.get("terms") or {}).items()}
+    for place, near in enumerate(summary.get("nearest_approach") or (), 1):
+        found[f"nearest_approach.{place}"] = near["sentence"]
     for part in _PARTS:
         section = summary.get(part) or {}
         plain = {key: value for key, value in section.items() if key not in _SKIPPED}

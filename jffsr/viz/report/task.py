@@ -69,7 +69,8 @@ def other_table(config: Mapping[str, Any], varied: Collection[str] = ()) -> str:
     wanted = {key: config[key] for key in _SECTIONS if config.get(key) is not None}
     rows = []
     for key, value in flattened(wanted):
-        if key in _OF_JOINTS or value is False or is_varied(key, varied):
+        of_joints = any(key == own or key.startswith(f"{own}.") for own in _OF_JOINTS)
+        if of_joints or is_varied(key, varied):
             continue
         name, unit = name_and_unit(key)
         rows.append((name.removeprefix("task, "), value, unit))
@@ -98,6 +99,4 @@ def _positions(task: Mapping[str, Any], end: str, degrees: np.ndarray) -> list[f
     values = shown if shown is not None else plain
     if not isinstance(values, (list, tuple)) or len(values) != len(degrees):
         return None
-    # A configuration in degrees means radians by them, also where a joint slides.
-    own = np.asarray(values, float) * (1.0 if shown is None else np.deg2rad(1.0))
-    return [float(value) for value in own * degrees]
+    return [float(value) for value in np.asarray(values, float) * (degrees if shown is None else 1.0)]

@@ -9,6 +9,7 @@ _ENDINGS = {
     "_deg": "deg",
     "_kg": "kg",
     "_m": "m",
+    "_s": "s",
     "_relative": "relative",
 }
 _NAMES = {
