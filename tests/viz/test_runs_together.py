@@ -88,6 +88,17 @@ def test_a_sweep_has_all_values_of_the_keys_that_it_sets(tmp_path):
     assert tables_of(results([sweep, run]))[0][1] == ["result", "1 of 4", "J = 2.0"]
 
 
+def test_keys_that_only_some_runs_have_are_folded_where_there_are_many(tmp_path):
+    one, other = read(tmp_path, "a"), read(tmp_path, "b", duration="20")
+    own = replace(other, config={**other.config, **{f"planner.key{number}": number for number in range(100)}})
+    html = differences([one, own])
+    seen, folded = tables_of(html)
+    assert [row[0] for row in seen[1:]] == ["task.duration"]
+    assert len(folded) == 101
+    assert "<summary>100 keys" in html
+    assert "<details>" not in differences([one, other])
+
+
 def test_a_number_and_a_text_like_it_differ(tmp_path):
     runs = [read(tmp_path, "a", kind="7"), read(tmp_path, "b", kind="'7'")]
     assert [row[0] for row in tables_of(differences(runs))[0][1:]] == ["optimizer.kind"]

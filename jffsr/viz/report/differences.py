@@ -30,6 +30,8 @@ _NUMBERS = {
 """Numbers that a summary of any kind may have, by their keys in it."""
 _PARTS = ("base", "grasp_error", "approach", "contact", "hold", "verification")
 _SKIPPED = ("mujoco", "terms_finer", "constraints", "trackers", "runs")
+_MOST_ROWS = 60
+"""Keys that are seen at once; of more, those that not all runs have are folded away."""
 _LONGEST = 160
 """Letters of a configuration's value that a cell shows."""
 
@@ -75,8 +77,18 @@ def differences(runs: Sequence[RunRead]) -> str:
             rows.append((key, *map(_shown, values)))
     if not rows:
         return "<p>Their configurations are the same.</p>"
-    words = f"<p>{NO_UNIT} is null, empty or not given; all other keys are the same.</p>"
-    return _beside("key", runs, rows) + words
+    folded = []
+    if len(rows) > _MOST_ROWS:
+        # Runs of several kinds have sections that the others do not know.
+        folded = [row for row in rows if NO_UNIT in row]
+        rows = [row for row in rows if NO_UNIT not in row]
+    empty = (
+        f" {NO_UNIT} is null, empty or not given." if any(NO_UNIT in row for row in (*rows, *folded)) else ""
+    )
+    words = f"<p>All other keys are the same.{empty}</p>"
+    more = f"<details><summary>{len(folded)} keys that only some of them have</summary>" if folded else ""
+    more += f"{_beside('key', runs, folded)}</details>" if folded else ""
+    return _beside("key", runs, rows) + more + words
 
 
 def results(runs: Sequence[RunRead]) -> str:
