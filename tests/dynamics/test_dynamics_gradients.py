@@ -26,7 +26,7 @@ NUMBERS = ("mass", "inertia", "link_com", "joint_position")
 
 
 # What a fixed base computes, the other two compute as well.
-@pytest.fixture(scope="module", params=[FLOATING, ATTITUDE_HELD])
+@pytest.fixture(scope="module", params=[FLOATING, pytest.param(ATTITUDE_HELD, marks=pytest.mark.slow)])
 def differentiated(request):
     """Directional derivatives by jvp, by vjp and by differences, along 12 directions of everything at once."""
     mode = request.param

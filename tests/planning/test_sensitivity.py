@@ -186,6 +186,7 @@ def test_summary_has_every_derivative_and_the_text_names_the_largest():
     assert sensitivity_lines(None) == []
 
 
+@pytest.mark.slow
 def test_planar_arm_without_a_tool(robots):
     """A planar motion turns about z alone, whatever the masses are."""
     robot = limited(robots["hu_2011_planar2"])

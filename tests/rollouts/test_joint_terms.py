@@ -82,7 +82,7 @@ def _same_trees(robots: dict[str, Robot]) -> dict[tuple, list[str]]:
 
 
 @pytest.mark.parametrize(
-    "place", [pytest.param(k, marks=[] if k in (0, 2) else [pytest.mark.slow]) for k in range(5)]
+    "place", [pytest.param(k, marks=[] if k == 0 else [pytest.mark.slow]) for k in range(5)]
 )
 def test_every_robot_of_the_catalogue(robots, place):
     groups = list(_same_trees(robots).values())

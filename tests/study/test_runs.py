@@ -223,6 +223,7 @@ def test_a_full_disk_is_told_in_one_sentence(small, tmp_path, capsys, monkeypatc
     assert err == "jffsr: No space left on device; make room and repeat the command\n"
 
 
+@pytest.mark.slow
 def test_float32_is_searched_and_verified_in_float64(small, tmp_path):
     swarm = [*small, "precision=float32", "optimizer.kind=qpso", "optimizer.evaluations=16"]
     code = (
