@@ -3,7 +3,7 @@
 JAX's own `register_dataclass` (jaxlib 0.10.2 and 0.12.0.1 at least) makes structures of different classes compare equal
 where the number of their numbers and their static fields are equal. Their hashes differ, which mostly keeps them
 apart: but a table that looks at a part of the hash first, as that behind `jax.jit` does, at times finds the program
-of the other class, and runs it. A quintic timing then moves at a constant rate, once in some hundred processes.
+of the other class, and runs it: in one run of the tests a quintic timing moved at a constant rate.
 """
 
 from __future__ import annotations
