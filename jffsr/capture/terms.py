@@ -92,6 +92,7 @@ class ExecutionTime:
 
     scale: Array | float = 1.0
     name: str = field(default="execution_time", metadata={"static": True})
+    unit = "s"
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
         """The last sample's time."""

@@ -52,6 +52,11 @@ class CompositeIndex:
     accuracy: float = 1.0
 
     @property
+    def units(self) -> dict[str, str]:
+        """The unit of each term's value by the term's name; an empty text where it says none."""
+        return {term.name: getattr(term, "unit", "") for term in self.terms}
+
+    @property
     def needs_torque(self) -> bool:
         """Whether some term reads the joint torques, which a motion then should carry."""
         return any(getattr(term, "needs_torque", False) for term in self.terms)

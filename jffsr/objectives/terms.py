@@ -2,7 +2,7 @@
 
 A term has a `name`, a `scale` (the paper's k: the weighted term is value / scale), `value(robot, motion)`, the
 published form, and `smooth(robot, motion, smoothing)`, which is differentiable everywhere and tends to it.
-Its `unit`, where it has one, is that of its value; without it a value is a ratio.
+Its `unit`, where it has one, is that of its value; an overrun's is relative.
 """
 
 from __future__ import annotations
@@ -108,6 +108,7 @@ class JointPosition:
     lower: Array
     upper: Array
     name: str = field(default="joint_position", metadata={"static": True})
+    unit = "relative"
 
     def _beyond(self, motion: Motion) -> Array:
         """How far (2, K, n) the motion is above the upper and below the lower limits, relative; -1 without one."""
@@ -138,6 +139,7 @@ class JointRate:
     scale: Array
     limit: Array
     name: str = field(default="joint_rate", metadata={"static": True})
+    unit = "relative"
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
         """The published form."""
@@ -156,6 +158,7 @@ class JointAcceleration:
     scale: Array
     limit: Array
     name: str = field(default="joint_acceleration", metadata={"static": True})
+    unit = "relative"
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
         """The published form."""
@@ -175,6 +178,7 @@ class AttitudeExcursion:
     limit: Array
     measure: str = field(default=ROTATION_VECTOR, metadata={"static": True})
     name: str = field(default="attitude_excursion", metadata={"static": True})
+    unit = "relative"
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:
         """The published form."""

@@ -149,6 +149,7 @@ class JointTorque:
     scale: Array
     limit: Array
     name: str = field(default="joint_torque", metadata={"static": True})
+    unit = "relative"
     needs_torque = True
 
     def value(self, robot: Robot, motion: Motion) -> Scalar:

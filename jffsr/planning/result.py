@@ -168,11 +168,11 @@ def constraints_missed(
     for constraint in problem.constraints:
         missed, allowed = float(verification.violations[constraint.name]), float(tolerance_of(constraint))
         if not missed <= allowed:
+            where = ""
             if motion is not None and isinstance(constraint, Clearance):
-                margin = float(np.asarray(constraint.margin))
-                yield f"{constraint.name} ({constraint.nearest(problem.robot, motion)}; the margin is {margin:g} m)"
-            else:
-                yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g})"
+                near, margin = constraint.nearest(problem.robot, motion), float(np.asarray(constraint.margin))
+                where = f"; at the planner's step {near}, the margin is {margin:g} m"
+            yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g}{where})"
 
 
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:

@@ -52,7 +52,9 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
     except IsADirectoryError:
         raise InputError(f"{shown}: this is a folder, {expected} is expected") from None
     except FileNotFoundError:
-        raise InputError(f"{shown}: there is no such file{hint(path.name, _beside(path))}") from None
+        raise InputError(
+            f"{shown}: there is no such file{hint(path.name, beside(path, (path.suffix,)))}"
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(f"{shown!r}: the file cannot be read ({reason.lower()})") from None
@@ -63,9 +65,9 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
     return data
 
 
-def _beside(path: Path) -> list[str]:
-    """Names of the files of the same kind in the folder of a file that is not there."""
+def beside(path: Path, suffixes: tuple[str, ...]) -> list[str]:
+    """Names of the files of these kinds in the folder of a file that is not there."""
     try:
-        return sorted(other.name for other in path.parent.iterdir() if other.suffix == path.suffix)
+        return sorted(other.name for other in path.parent.iterdir() if other.suffix in suffixes)
     except OSError:
         return []

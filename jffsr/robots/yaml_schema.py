@@ -95,7 +95,9 @@ class JointModel(Section):
         for quantity in LimitsModel.units:
             key = self.limits.key_of(quantity)
             if self.type == "prismatic" and key.endswith("_deg"):
-                raise conflict(f"given, but the joint slides; give '{quantity}', in m", f"limits.{key}")
+                raise conflict(
+                    f"given, but the joint slides; give '{quantity}', in SI units", f"limits.{key}"
+                )
         return self
 
 

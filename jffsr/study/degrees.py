@@ -18,5 +18,5 @@ def refuse_degrees(config: RobotStudy, section: str, quantity: str, robot: Robot
         if kind == PRISMATIC and (not isinstance(value, dict) or name in value):
             raise InputError(
                 f"{config.where(f'{section}.{key}')}: joint '{name}' slides, and is not given in degrees; give "
-                f"'{quantity}', in rad and m"
+                f"'{quantity}', in SI units"
             )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from jffsr.errors import InputError
 from jffsr.reading.did_you_mean import listed, nearest
+from jffsr.reading.files import beside
 
 SUFFIXES = (".yaml", ".yml")
 
@@ -55,10 +56,11 @@ def find_config(name: str | os.PathLike[str]) -> Path:
     if os.path.isdir(text):
         raise InputError(f"{text}: this is a folder, a YAML file is expected")
     stems = [path.stem for path in known]
-    beside = _beside(Path(text))
-    if close := nearest(Path(text).stem, [path.stem for path in beside]):
-        found = next(path for path in beside if path.stem == close[0])
-        raise InputError(f"{text[:200]!r} is no file; did you mean '{shown(found)}'?")
+    wanted = Path(text)
+    neighbours = {Path(name).stem: name for name in beside(wanted, SUFFIXES)}
+    if close := nearest(wanted.stem, neighbours):
+        found = shown(wanted.with_name(neighbours[close[0]]))
+        raise InputError(f"{text[:200]!r} is no file; did you mean '{found}'?")
     close = nearest(Path(text).stem, stems, 3)
     advice = f"; did you mean {listed(repr(stem) for stem in close)}?" if close else ""
     if not close and known:
@@ -66,14 +68,6 @@ def find_config(name: str | os.PathLike[str]) -> Path:
     raise InputError(
         f"{text[:200]!r} is neither a file nor the name of a configuration under configs/{advice}"
     )
-
-
-def _beside(path: Path) -> list[Path]:
-    """The YAML files in the folder of one that is not there."""
-    try:
-        return sorted(other for other in path.parent.iterdir() if other.suffix in SUFFIXES)
-    except OSError:
-        return []
 
 
 def with_suffixes(path: Path) -> list[Path]:

@@ -39,7 +39,7 @@ class RobotFiles:
                 write_bytes(path, content)
             elif path.read_bytes() != content:
                 raise InputError(
-                    f"--out {folder}: '{name}' there is not the robot's file as it is now, and what is in the folder "
+                    f"--out {folder}: '{name}' there is not the study's file as it is now, and what is in the folder "
                     f"was computed with the one there; give another folder"
                 )
 

@@ -22,7 +22,7 @@ _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
 def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]:
     """The summary of a plan, plain data; arrays and numbers that are not finite are left to the writer."""
     verification, problem = plan.verification, plan.problem
-    units = {term.name: getattr(term, "unit", "") for term in problem.objective.terms}
+    units = problem.objective.units
     clearance = [
         one.nearest(problem.robot, plan.motion) for one in problem.constraints if isinstance(one, Clearance)
     ]

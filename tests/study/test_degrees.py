@@ -48,7 +48,7 @@ def test_joints_that_turn_may_be_given_in_degrees_beside_one_that_slides():
 @pytest.mark.parametrize(
     ("limits", "told"),
     [
-        ("{position_deg: [-1, 1]}", "joints.1.limits.position_deg: given, but the joint slides; give 'position', in m"),
+        ("{position_deg: [-1, 1]}", "joints.1.limits.position_deg: given, but the joint slides; give 'position'"),
         ("{position: [-1, 1], rate_deg: 5}", "joints.1.limits.rate_deg: given, but the joint slides"),
         ("{rate: 1, rate_deg: 1}", "joints.1.limits.rate: both 'rate_deg' and 'rate' are given, keep one"),
     ],

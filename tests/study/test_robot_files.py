@@ -98,7 +98,7 @@ def test_a_run_goes_on_with_the_same_robot_alone(tmp_path, project):
     assert (out / "config.yaml").read_text() == text
     (project / "arms" / "urdf" / "arm.urdf").write_text(ARM.replace('"90"', '"91"'))
     with pytest.raises(
-        InputError, match=r"'robot/urdf/arm\.urdf' there is not the robot's file as it is now"
+        InputError, match=r"'robot/urdf/arm\.urdf' there is not the study's file as it is now"
     ):
         claim_run_folder(load_config(task), out)
     assert "90" in (out / "robot" / "urdf" / "arm.urdf").read_text()

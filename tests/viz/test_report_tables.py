@@ -93,8 +93,8 @@ def test_lists_without_numbers_are_left_out_of_what_was_measured():
 
 def test_terms_say_their_units_and_what_counts_one():
     terms = {
-        "attitude_change": {"value": 0.1, "weighted": 57.3},
-        "joint_rate": {"value": 0.02, "weighted": 2.0},
+        "attitude_change": {"value": 0.1, "weighted": 57.3, "unit": "rad"},
+        "joint_rate": {"value": 0.02, "weighted": 2.0, "unit": "relative"},
         "own": {"value": 3.0, "weighted": 3.0, "unit": "kg"},
     }
     objective = {"attitude_change": {"scale_deg": 0.1}, "joint_rate": {"scale": 0.01}, "terms": []}

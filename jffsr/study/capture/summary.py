@@ -61,9 +61,10 @@ def sizes(error: Array) -> dict[str, float]:
     return {name: float(np.linalg.norm(error[k : k + 3])) for name, k in _PARTS.items()}
 
 
-def _terms(plan: CapturePlan) -> dict[str, dict[str, float]]:
+def _terms(plan: CapturePlan) -> dict[str, dict[str, Any]]:
+    units = plan.problem.objective.units
     return {
-        name: {"value": float(term.value), "weighted": float(term.weighted)}
+        name: {"value": float(term.value), "unit": units[name], "weighted": float(term.weighted)}
         for name, term in plan.terms.items()
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -107,17 +107,17 @@ def _result(summary: Mapping[str, Any], config: Mapping[str, Any]) -> str:
     return "\n".join(part for part in [*parts, printed] if part)
 
 
-def scales(objective: Mapping[str, Any], terms: Iterable[str]) -> dict[str, str]:
+def scales(objective: Mapping[str, Any], terms: Mapping[str, Any]) -> dict[str, str]:
     """Which value of each term counts 1, with its unit, by the section `objective` of a configuration."""
     found = {}
-    for name in terms:
+    for name, term in terms.items():
         section = objective.get(name)
         if not isinstance(section, Mapping):
             continue
         if section.get("scale_deg") is not None:
             found[name] = f"{section['scale_deg']:g} deg"
         elif section.get("scale") is not None:
-            unit = term_unit(name)
+            unit = term_unit(name, term)
             found[name] = f"{section['scale']:g}" + (f" {unit}" if unit != NO_UNIT else "")
     return found
 

@@ -81,7 +81,7 @@ def terms_table(
     columns = [
         ("term", [name.replace("_", " ") for name in terms]),
         ("value", [term["value"] for term in terms.values()]),
-        ("unit", [term.get("unit") or term_unit(name) for name, term in terms.items()]),
+        ("unit", [term_unit(name, term) for name, term in terms.items()]),
         ("counts 1 at", [scales.get(name, NO_UNIT) for name in terms] if scales else []),
         ("weighted", [term["weighted"] for term in terms.values()]),
         ("weighted, finer re-run", [finer.get(name, {}).get("weighted") for name in terms]),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 _ENDINGS = {
     "_rad_s": "rad/s",
     "_m_s": "m/s",
@@ -83,27 +86,6 @@ _PLACES = {
     "observation.prior.offset_deviation": "m",
     "observation.convergence.angular_velocity_deg": "deg/s",
 }
-_TERMS = {
-    "attitude_change": "rad",
-    "joint_position": "relative",
-    "joint_rate": "relative",
-    "joint_acceleration": "relative",
-    "joint_torque": "relative",
-    "attitude_excursion": "relative",
-    "tool_position": "m",
-    "torque_integral": "N m s",
-    "torque_energy": "N^2 m^2 s",
-    "mechanical_work": "J",
-    "peak_torque": "N m",
-    "attitude_penalty": "rad^2",
-    "execution_time": "s",
-    "position_peak": "m",
-    "position_rms": "m",
-    "position_end": "m",
-    "attitude_peak": "rad",
-    "attitude_rms": "rad",
-    "attitude_end": "rad",
-}
 NO_UNIT = "–"
 
 
@@ -123,6 +105,6 @@ def name_and_unit(path: str) -> tuple[str, str]:
     return ", ".join(part.replace("_", " ") for part in parts), unit
 
 
-def term_unit(name: str) -> str:
-    """The unit of a term's value before it is weighted; a dash where it has none, or is the user's own."""
-    return _TERMS.get(name, NO_UNIT)
+def term_unit(name: str, term: Mapping[str, Any]) -> str:
+    """The unit of a term's value, of a tracking error by its name; a dash where the summary says none."""
+    return term.get("unit") or name_and_unit(name)[1] or NO_UNIT
