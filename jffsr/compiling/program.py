@@ -23,7 +23,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
-from jffsr.compiling import room, store
+from jffsr.compiling import heap, room, store
 from jffsr.compiling.options import ONCE, OPTIONS
 
 _WORKERS = 2
@@ -53,6 +53,7 @@ def forget() -> None:
         known.forget()
     jax.clear_caches()
     gc.collect()
+    heap.give_back()
 
 
 class Program:

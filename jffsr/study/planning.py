@@ -23,6 +23,7 @@ from jffsr.study.run_folder import RunFolder
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.searching import kept_search
 from jffsr.study.summary import plan_summary
+from jffsr.study.unused import unused_keys
 
 
 def plan(
@@ -80,6 +81,8 @@ def run_planning(
     folder, finished, begun = claim(config, out)
     if finished:
         return Run(folder, shared_summary(folder), already_finished=True)
+    for note in unused_keys([config]):
+        say(note)
     kind, settings = build_settings(config)
     phases, searched = search_of(problem, kind, settings)
     try:

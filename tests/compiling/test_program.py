@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import threading
 import weakref
+from pathlib import Path
 
 import chex
 import jax
@@ -11,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jffsr.compiling import Program, forget, room
+from jffsr.compiling import Program, forget, heap, room
 from jffsr.compiling.program import is_waiting, seconds_waited
 
 
@@ -118,6 +121,28 @@ def test_what_is_forgotten_is_compiled_anew():
     results.append(program(np.float64(3.0)))
     assert len(traces) == 2
     np.testing.assert_array_equal(results, [2.0, 4.0, 6.0])
+
+
+def test_freed_memory_goes_back_to_the_system():
+    if not hasattr(ctypes.CDLL(None), "malloc_trim"):
+        assert not heap.give_back()
+        return
+
+    def resident():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    library = ctypes.CDLL(None)
+    library.malloc.restype = ctypes.c_void_p
+    pieces = [library.malloc(ctypes.c_size_t(10_000)) for _ in range(10_000)]
+    for piece in pieces:
+        ctypes.memset(piece, 1, 10_000)
+    # The last one stays, and with it, for glibc alone, everything below.
+    for piece in pieces[:-1]:
+        library.free(ctypes.c_void_p(piece))
+    kept = resident()
+    assert heap.give_back()
+    assert kept - resident() > 50e6
+    library.free(ctypes.c_void_p(pieces[-1]))
 
 
 def test_before_the_mappings_end_what_was_compiled_is_let_go_of(monkeypatch):

@@ -20,6 +20,7 @@ from jffsr.study.sweep.significance import compare
 from jffsr.study.sweep.specification import Specification
 from jffsr.study.sweep.table import MOST_PRINTED, keys_of, markdown
 from jffsr.study.sweep.tasks import Task, sort_into_tasks
+from jffsr.study.unused import unused_keys
 
 
 @dataclass(frozen=True)
@@ -85,6 +86,8 @@ def _run(
         return Sweep(folder, folder.read_summary(), table, already_finished=True)
     todo = [left for task in tasks if (left := task.without(done)) is not None]
     say(f"{spec.name}: {len(points)} points in {len(tasks)} compiled calls" + _going_on(done))
+    for note in unused_keys(point.config for point in points):
+        say(note)
     failures: list[str] = []
     reasons: dict[int, str] = {}
     ended = 0

@@ -22,6 +22,7 @@ from jffsr.study.tracking.dataset import tracking_dataset
 from jffsr.study.tracking.schema import TrackingConfig
 from jffsr.study.tracking.summary import tracking_summary
 from jffsr.study.tracking.tracked_path import track_task
+from jffsr.study.unused import unused_keys
 from jffsr.tracking.outcome import check_path
 from jffsr.tracking.tracker import Tracker, check_gains, check_tracker
 from jffsr.tracking.tracking import samples
@@ -48,6 +49,8 @@ def run_tracking(
     with Stopwatch() as watch:
         if tuning is not None:
             wanted = config.tuning.optimizer
+            for note in unused_keys([config], "tuning.optimizer"):
+                say(note)
             phases = build_phases(wanted.kind, wanted.settings())
             with kept_search(
                 folder, begun, phases, tuning, seed=config.seed, progress=config.output.progress, say=say
