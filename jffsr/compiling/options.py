@@ -10,9 +10,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from typing import TypeVar
 
 import jax
+
+F = TypeVar("F", bound=Callable)
 
 OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 if jax.__version_info__ < (0, 11):
@@ -24,3 +28,14 @@ ONCE = {**OPTIONS, "xla_backend_optimization_level": 0}
 
 jit = partial(jax.jit, compiler_options=OPTIONS)
 """`jax.jit`, to be used the same way, for whatever runs or differentiates a rollout."""
+
+
+def one_program(function: F | None = None, *, static_argnames: str | tuple[str, ...] = ()) -> F:
+    """A function that is one program where it is called by itself, and part of the caller's where that is traced.
+
+    Without it each of its operations would be a program of its own, compiled at its first call: a second for the
+    kinematics of one arm.
+    """
+    if function is None:
+        return partial(one_program, static_argnames=static_argnames)
+    return jax.jit(function, inline=True, static_argnames=static_argnames)

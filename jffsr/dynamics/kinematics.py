@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 
+from jffsr.compiling.options import one_program
 from jffsr.pytrees import register_dataclass
 from jffsr.robots.robot import REVOLUTE, Robot
 from jffsr.robots.state import State
@@ -36,6 +37,7 @@ class Kinematics:
     angular_jacobian: Array
 
 
+@one_program
 def kinematics(robot: Robot, state: State) -> Kinematics:
     """Kinematics of a state (base pose and joint positions; velocities are not used)."""
     topology = robot.topology
@@ -88,6 +90,7 @@ def _point_jacobian(robot: Robot, axis, anchor, point, support) -> tuple[Array, 
     )
 
 
+@one_program
 def system_com(robot: Robot, kin: Kinematics) -> Vector3:
     """Centre of mass of the whole system (3,), m, in I."""
     mass = jnp.asarray(robot.mass)
@@ -101,6 +104,7 @@ def _tool(robot: Robot, kin: Kinematics, end_effector: str | None) -> tuple[int,
     return body, position, kin.rotation[body] @ robot.end_effector_rotation[index]
 
 
+@one_program(static_argnames="end_effector")
 def end_effector_pose(
     robot: Robot, kin: Kinematics, end_effector: str | None = None
 ) -> tuple[Vector3, Quaternion]:
@@ -109,6 +113,7 @@ def end_effector_pose(
     return position, matrix_to_quaternion(rotation)
 
 
+@one_program(static_argnames="end_effector")
 def jacobians(robot: Robot, kin: Kinematics, end_effector: str | None = None) -> tuple[Matrix, Matrix]:
     """Base Jacobian J_b (6, 6) and joint Jacobian J_m (6, n) of an end effector.
 

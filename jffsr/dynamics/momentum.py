@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
+from jffsr.compiling.options import one_program
 from jffsr.dynamics.base_mode import FLOATING, base_freedom
 from jffsr.dynamics.kinematics import Kinematics, jacobians, system_com
 from jffsr.dynamics.spatial_tree import body_twists, spatial_inertias
@@ -17,6 +18,7 @@ from jffsr.spatial.inertia import parallel_axis, skew
 from jffsr.types import Matrix, Scalar, Twist, Vector
 
 
+@one_program
 def inertia_blocks(robot: Robot, kin: Kinematics) -> tuple[Matrix, Matrix, Matrix]:
     """Base inertia H_b (6, 6), coupling inertia H_bm (6, n), joint inertia H_m (n, n).
 
@@ -37,6 +39,7 @@ def inertia_blocks(robot: Robot, kin: Kinematics) -> tuple[Matrix, Matrix, Matri
     return h_b, h_bm, h_m
 
 
+@one_program(static_argnames="base_mode")
 def generalized_inertia(robot: Robot, kin: Kinematics, base_mode: str = FLOATING) -> Matrix:
     """Generalized inertia tensor H_m - H_bm' H_b^-1 H_bm (n, n) (Xu and Kanade 1992).
 
@@ -48,6 +51,7 @@ def generalized_inertia(robot: Robot, kin: Kinematics, base_mode: str = FLOATING
     return h_m if free == 0 else h_m - h_bm[:free].T @ jnp.linalg.solve(h_b[:free, :free], h_bm[:free])
 
 
+@one_program
 def momentum(robot: Robot, kin: Kinematics, base_twist: Twist, joint_velocity: Vector) -> Twist:
     """Momentum (6,): P, N s, then L about the system centre of mass, N m s, both in I."""
     twists = body_twists(robot, kin, base_twist, joint_velocity)
@@ -63,6 +67,7 @@ def _momentum_about_base(robot: Robot, kin: Kinematics, momentum: Twist) -> Twis
     return jnp.concatenate([linear, angular + jnp.cross(lever, linear)])
 
 
+@one_program(static_argnames="base_mode")
 def base_twist(
     robot: Robot,
     kin: Kinematics,
@@ -86,6 +91,7 @@ def base_twist(
     return jnp.concatenate([jnp.linalg.solve(h_b[:free, :free], about_base[:free]), jnp.zeros(6 - free)])
 
 
+@one_program(static_argnames=("end_effector", "base_mode"))
 def generalized_jacobian(
     robot: Robot, kin: Kinematics, end_effector: str | None = None, base_mode: str = FLOATING
 ) -> Matrix:
@@ -102,6 +108,7 @@ def generalized_jacobian(
     return j_m - j_b[:, :free] @ jnp.linalg.solve(h_b[:free, :free], h_bm[:free])
 
 
+@one_program
 def kinetic_energy(robot: Robot, kin: Kinematics, base_twist: Twist, joint_velocity: Vector) -> Scalar:
     """Kinetic energy, J, of the whole system."""
     twists = body_twists(robot, kin, base_twist, joint_velocity)
