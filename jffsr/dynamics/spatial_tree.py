@@ -11,14 +11,12 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from jffsr.compiling.options import one_program
 from jffsr.dynamics.kinematics import Kinematics
 from jffsr.robots.robot import Robot
 from jffsr.spatial.inertia import parallel_axis, skew
 from jffsr.types import Array, Twist, Vector
 
 
-@one_program
 def motion_subspace(robot: Robot, kin: Kinematics) -> Array:
     """Twist (n, 6) about O of each joint per unit of its rate."""
     turning = robot.topology.is_revolute[:, None]
@@ -27,7 +25,6 @@ def motion_subspace(robot: Robot, kin: Kinematics) -> Array:
     return jnp.concatenate([linear, jnp.where(turning, kin.axis, 0.0)], axis=-1)
 
 
-@one_program
 def spatial_inertias(robot: Robot, kin: Kinematics) -> Array:
     """Inertia (b, 6, 6) of each body about O: momentum [P; L about O] per twist."""
     mass = jnp.asarray(robot.mass)[:, None, None]
@@ -40,7 +37,6 @@ def spatial_inertias(robot: Robot, kin: Kinematics) -> Array:
     )
 
 
-@one_program
 def body_twists(robot: Robot, kin: Kinematics, base_twist: Twist, joint_velocity: Vector) -> Array:
     """Twist (b, 6) about O of each body."""
     steps = motion_subspace(robot, kin) * joint_velocity[:, None]
@@ -63,14 +59,12 @@ def inwards(parents: tuple[int, ...], values: Array) -> Array:
     return jnp.stack(totals)
 
 
-@one_program
 def cross_motion(v: Array, m: Array) -> Array:
     """v x m (..., 6): the rate at which a twist m that is carried along with v changes."""
     linear = jnp.cross(v[..., 3:], m[..., :3]) + jnp.cross(v[..., :3], m[..., 3:])
     return jnp.concatenate([linear, jnp.cross(v[..., 3:], m[..., 3:])], axis=-1)
 
 
-@one_program
 def cross_force(v: Array, f: Array) -> Array:
     """v x* f (..., 6): the rate at which a momentum or wrench f that is carried along with v changes."""
     angular = jnp.cross(v[..., 3:], f[..., 3:]) + jnp.cross(v[..., :3], f[..., :3])

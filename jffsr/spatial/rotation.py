@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from jffsr.compiling.options import one_program
 from jffsr.spatial.safe import safe_atan2
 from jffsr.types import Array, Matrix3, Quaternion, Vector3
 
@@ -16,7 +15,6 @@ from jffsr.types import Array, Matrix3, Quaternion, Vector3
 _SMALL_SQUARED = 1e-10
 
 
-@one_program
 def quaternion_multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Hamilton product a b of two quaternions, shape (..., 4): first b, then a."""
     aw, ax, ay, az = jnp.moveaxis(a, -1, 0)
@@ -32,13 +30,11 @@ def quaternion_multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     )
 
 
-@one_program
 def quaternion_conjugate(q: Quaternion) -> Quaternion:
     """Inverse of a unit quaternion, shape (..., 4)."""
     return q * jnp.array([1.0, -1.0, -1.0, -1.0], dtype=q.dtype)
 
 
-@one_program
 def quaternion_to_matrix(q: Quaternion) -> Matrix3:
     """Rotation matrix (..., 3, 3) of a unit quaternion (..., 4)."""
     w, x, y, z = jnp.moveaxis(q, -1, 0)
@@ -50,7 +46,6 @@ def quaternion_to_matrix(q: Quaternion) -> Matrix3:
     return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-@one_program
 def matrix_to_quaternion(rotation: Matrix3) -> Quaternion:
     """Unit quaternion (4,) with w >= 0 of a rotation matrix (3, 3); differentiable at every rotation.
 
@@ -74,7 +69,6 @@ def matrix_to_quaternion(rotation: Matrix3) -> Quaternion:
     return jnp.where(q[0] < 0, -q, q)
 
 
-@one_program
 def rotation_vector_to_quaternion(vector: Vector3) -> Quaternion:
     """Unit quaternion (..., 4) of the rotation by |vector| rad about vector (..., 3); smooth at zero."""
     squared = jnp.sum(vector * vector, axis=-1, keepdims=True)
@@ -85,7 +79,6 @@ def rotation_vector_to_quaternion(vector: Vector3) -> Quaternion:
     return jnp.concatenate([cosine, scale * vector], axis=-1)
 
 
-@one_program
 def quaternion_to_rotation_vector(q: Quaternion) -> Vector3:
     """Rotation vector (..., 3), rad, of length at most pi, of a unit quaternion (..., 4).
 
@@ -96,7 +89,6 @@ def quaternion_to_rotation_vector(q: Quaternion) -> Vector3:
     return _rotation_vector(q[..., :1], q[..., 1:])
 
 
-@one_program
 def rounded_rotation_vector(q: Quaternion, width: Array) -> Vector3:
     """Rotation vector (..., 3), rad, whose length is rounded off where it peaks, at 180 degrees.
 
@@ -117,7 +109,6 @@ def _rotation_vector(w: Array, v: Vector3) -> Vector3:
     return jnp.where(small, series, 2 * jnp.arctan2(length, w) / length) * v
 
 
-@one_program
 def axis_angle_to_matrix(axis: Vector3, angle: Array) -> Matrix3:
     """Rotation matrix (3, 3) by `angle` rad about the unit vector `axis` (Rodrigues)."""
     c, s = jnp.cos(angle), jnp.sin(angle)
@@ -132,7 +123,6 @@ def axis_angle_to_matrix(axis: Vector3, angle: Array) -> Matrix3:
     )
 
 
-@one_program
 def quaternion_to_euler_zxy(q: Quaternion) -> Vector3:
     """Angles (..., 3) about z, x, y, rad, with R = Rz(a) Rx(b) Ry(c): the attitude angles of Li 2022.
 
@@ -146,7 +136,6 @@ def quaternion_to_euler_zxy(q: Quaternion) -> Vector3:
     return jnp.stack([about_z, about_x, about_y], axis=-1)
 
 
-@one_program
 def frame_along(axis: Vector3) -> Matrix3:
     """Rotation matrices (..., 3, 3) whose third column points along `axis` (..., 3), of any length.
 

@@ -42,7 +42,9 @@ def servicer(robots):
     return robot, position, quaternion, jffsr.inverse_kinematics(robot, position, quaternion, starts)
 
 
-@pytest.mark.parametrize("name", ["two_arms", "dual_arm_servicer", "wu_2018_6dof"])
+@pytest.mark.parametrize(
+    "name", ["two_arms", pytest.param("dual_arm_servicer", marks=pytest.mark.slow), "wu_2018_6dof"]
+)
 def test_the_batch_kinematics_is_the_readable_one(robots, name):
     robot = robots[name]
     end_effector = robot.end_effector_names[-1]

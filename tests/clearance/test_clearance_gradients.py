@@ -26,9 +26,10 @@ class FreeBodies:
         self.count = count = len(kinds)
         generator = np.random.default_rng(1)
         names = tuple(f"body{k}" for k in range(count))
-        # A second shape on one body, so that the nearest of several is taken.
+        # A second shape on one body, so that the nearest of several is taken; two boxes compile for long.
         solids = {k: [solid_of(random_shape(kind, generator), k, False)] for k, kind in enumerate(kinds)}
-        solids[1].append(solid_of(random_shape("box", generator), 1, False))
+        second = "box" if count > 2 else "sphere"
+        solids[1].append(solid_of(random_shape(second, generator), 1, False))
         topology = Topology("free", (), (), (), names, (), ())
         self.model = ClearanceModel.of_solids(topology, solids, list(combinations(range(count), 2)))
 

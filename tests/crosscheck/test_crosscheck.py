@@ -219,6 +219,7 @@ def test_table_has_a_row_per_engine_and_step():
     assert len({len(line) for line in lines[:-1]}) == 1
 
 
+@pytest.mark.slow
 def test_only_the_harmless_lines_are_dropped():
     code = (
         "from jffsr.crosscheck.quiet import HARMLESS_LINES, without_harmless_lines, import_mjx\n"

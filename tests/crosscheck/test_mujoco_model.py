@@ -14,7 +14,12 @@ from jffsr.errors import InputError
 
 TREE = Path(__file__).parents[1] / "data" / "robots" / "tree_prismatic.yaml"
 
-ROBOTS = [*jffsr.list_robots(), str(TREE)]
+# A planar arm, a long one, two arms, and a tree that slides; the others have nothing that these lack.
+NOW = {"hu_2011_planar2", "canadarm2_7dof", "dual_arm_servicer", str(TREE)}
+ROBOTS = [
+    pytest.param(name, marks=[] if name in NOW else [pytest.mark.slow])
+    for name in (*jffsr.list_robots(), str(TREE))
+]
 
 
 class Setting:

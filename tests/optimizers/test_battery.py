@@ -102,6 +102,8 @@ def assert_same(one, other):
 
 
 every = pytest.mark.parametrize("kind", OPTIMIZERS)
+# Those that compile for long under vmap; what is theirs alone stands in their own tests.
+LONG = {"memetic", "ssade", "cma_es", "ga", "ga_binary"}
 
 
 @every
@@ -205,7 +207,9 @@ def few_steps(length, optimizers, keys):
     return jax.vmap(one)(optimizers, keys)
 
 
-@every
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] if kind in LONG else []) for kind in OPTIMIZERS]
+)
 def test_vmap_over_hyperparameters_and_seeds(kind):
     """Two seeds times two settings of every traced hyperparameter in one call, against one run at a time."""
     phase = phases(kind)[-1]

@@ -32,7 +32,7 @@ def searched(problem, method, population=None, key=0):
     return run(phases, problem, jax.random.key(key), population=population)
 
 
-@pytest.mark.parametrize("published", [G06, HS71], ids=["g06", "hs71"])
+@pytest.mark.parametrize("published", [pytest.param(G06, marks=pytest.mark.slow), HS71], ids=["g06", "hs71"])
 def test_the_best_start_finds_the_published_optimum(published):
     found = searched(posed(published), SequentialQuadratic(starts=6, inside=0.0, radius=0.1))
     value, missed = split(found.best_value)

@@ -9,7 +9,7 @@ from laws import TOLERANCE, batch_of, check
 LAWS = 31
 
 
-@pytest.mark.parametrize("number", [2, 6])
+@pytest.mark.parametrize("number", [2, pytest.param(6, marks=pytest.mark.slow)])
 def test_every_law_holds(number):
     batch = batch_of(1, number, 4)
     assert batch.torques.shape == (4, number + 1)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from loop_cases import POSTURE, ROBOT, START, loaded
 
 from jffsr.compiling import jit
@@ -27,6 +28,7 @@ GAINS = Gains(np.full(3, 10.0), np.full(3, 1.0))
 TRUE = Load(5.0, np.array([0.1, 0.0, 0.0]), 2.5 * np.eye(3))
 
 
+@pytest.mark.slow
 def test_with_the_true_load_the_plant_accelerates_as_wanted():
     """Our forward dynamics of the compound, to which the torque is given, shares no code with the torque's way here."""
     whole = loaded()

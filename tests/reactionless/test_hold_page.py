@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from jffsr.study.config import load_config
 from jffsr.study.reactionless.schema_hold import CONTROLLERS, ESTIMATORS
@@ -24,6 +25,7 @@ def test_the_yaml_is_a_study(tmp_path):
     assert config.strike.time == 20
 
 
+@pytest.mark.docs
 def test_the_python_holds_the_base(capsys):
     (text,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     names = {}

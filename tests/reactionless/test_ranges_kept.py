@@ -145,7 +145,7 @@ def test_the_base_feels_nothing_of_it(name):
     assert np.abs(rates - without).max() > 1e-3
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param("seven axes", marks=pytest.mark.slow), "planar"])
 def test_rate_limits_come_before_the_ranges(name):
     """The momentum is absorbed in full, and what leads the joints back is only as fast as the limits leave room for."""
     robot, mass, q, momentum, axes = CASES[name]

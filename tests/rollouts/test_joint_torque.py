@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import jax
@@ -13,7 +14,7 @@ import pytest
 
 from jffsr.compiling import ONCE
 from jffsr.crosscheck.mujoco_model import to_mjmodel
-from jffsr.dynamics.base_mode import BASE_MODES
+from jffsr.dynamics.base_mode import BASE_MODES, FLOATING
 from jffsr.errors import InputError
 from jffsr.robots.loading import load_robot
 from jffsr.robots.state import State
@@ -39,17 +40,21 @@ def robot():
 
 @pytest.fixture(scope="module")
 def motions(robot):
-    """By base mode, with their torques."""
+    """By base mode, with their torques; each is made when it is first asked for."""
 
+    @cache
     def one(mode):
-        motion = rollout(robot, LAW, START, num_steps=STEPS, momentum=MOMENTUM, base_mode=mode)
-        return with_joint_torque(robot, motion)
+        def made():
+            motion = rollout(robot, LAW, START, num_steps=STEPS, momentum=MOMENTUM, base_mode=mode)
+            return with_joint_torque(robot, motion)
 
-    return jax.jit(lambda: {mode: one(mode) for mode in BASE_MODES}, compiler_options=ONCE)()
+        return jax.jit(made, compiler_options=ONCE)()
+
+    return one
 
 
 def test_mujoco_accelerates_under_them_as_the_motion_does(robot, motions):
-    motion = motions["floating"]
+    motion = motions(FLOATING)
     assert motion.joint_torque.shape == (STEPS + 1, 4)
     model = to_mjmodel(robot, 1e-3)
     data = mujoco.MjData(model)
@@ -66,10 +71,12 @@ def test_mujoco_accelerates_under_them_as_the_motion_does(robot, motions):
     assert np.ptp(motion.joint_torque, axis=0).min() > 0.01
 
 
-@pytest.mark.parametrize("mode", BASE_MODES)
+@pytest.mark.parametrize(
+    "mode", [pytest.param(mode, marks=[] if mode == FLOATING else [pytest.mark.slow]) for mode in BASE_MODES]
+)
 def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
     """The torques of all samples as a function of time alone; a step of the driven motion takes two samples."""
-    planned = motions[mode]
+    planned = motions(mode)
     torques = jnp.asarray(planned.joint_torque)
     half = DURATION / STEPS
     start = State(
@@ -88,10 +95,10 @@ def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
         np.testing.assert_allclose(getattr(driven, name), getattr(planned, name)[::2], rtol=0, atol=3e-7)
 
 
-@pytest.mark.parametrize("kinds", ["as they are", "all slide"])
+@pytest.mark.parametrize("kinds", ["as they are", pytest.param("all slide", marks=pytest.mark.slow)])
 def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions, kinds):
     """On a tree whose joints turn, slide, and do both in one unbranched part."""
-    motion = motions["floating"]
+    motion = motions(FLOATING)
     if kinds == "all slide":
         robot = robot.replace(topology=replace(robot.topology, joint_types=("prismatic",) * 4))
     both = jax.jit(
@@ -103,7 +110,7 @@ def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions, kinds):
 
 
 def test_torques_that_a_motion_carries_are_not_computed_again(robot, motions):
-    motion = motions["floating"]
+    motion = motions(FLOATING)
     assert with_joint_torque(robot, motion) is motion
     with pytest.raises(InputError, match="kernel"):
         joint_torque(robot, motion, "quick")

@@ -18,7 +18,7 @@ from jffsr.spatial.rotation import quaternion_conjugate, quaternion_multiply
 MOMENTUM = np.array([1.0, -2.0, 0.5, 3.0, 2.0, -4.0])
 START_ATTITUDE = np.array([0.8, 0.2, -0.4, 0.4])
 # A long chain, a planar one and a tree; more chains would compile for long and add nothing.
-OTHERS = ["servicer_7dof", "two_arms", "ye_2019_planar3"]
+OTHERS = [pytest.param("servicer_7dof", marks=pytest.mark.slow), "two_arms", "ye_2019_planar3"]
 
 
 def _setting(robot):

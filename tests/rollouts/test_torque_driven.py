@@ -55,7 +55,9 @@ def _following(robot, trajectory, mode):
     return torque
 
 
-@pytest.mark.parametrize("mode", BASE_MODES)
+@pytest.mark.parametrize(
+    "mode", [pytest.param(mode, marks=[] if mode == FLOATING else [pytest.mark.slow]) for mode in BASE_MODES]
+)
 def test_inverse_dynamics_drives_the_robot_along_the_momentum_equations_motion(robot, start, mode):
     goal = start.joint_position + np.array([0.9, 0.2, -0.8, 1.2])
     trajectory = Quintic(start.joint_position, goal, np.array(DURATION))

@@ -175,6 +175,7 @@ class TurnTarget:
         return ToolTarget(jnp.zeros(3), rotation_vector_to_quaternion(turn), jnp.zeros(6), jnp.zeros(6))
 
 
+@pytest.mark.slow
 def test_least_largest_error_of_a_turn_that_is_too_fast(robots):
     """On a fixed base two parallel joints turn the tool at most twice as fast as one. A motion slower than r that is
     never off by more than e needs e >= (x_j - x_i - r (t_j - t_i))/2 for all i < j, and those that start on time

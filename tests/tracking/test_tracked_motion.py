@@ -201,6 +201,7 @@ def test_a_fixed_base_stands_still_and_the_tool_follows(planar):
     assert float(pose_errors(held).position_peak) < 2e-4
 
 
+@pytest.mark.slow
 def test_a_batch_of_trackers_and_momenta_is_each_of_them(planar):
     gains = jnp.linspace(0.0, 5.0, 1000)
     trackers = dataclasses.replace(PLANAR, position_gain=gains)

@@ -98,7 +98,13 @@ def test_twist_and_its_derivative_are_continuous(name):
     np.testing.assert_allclose(ahead.acceleration, behind.acceleration, rtol=0, atol=1e-5)
 
 
-@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name in ("waypoints", "circle") else [pytest.mark.slow])
+        for name in PATHS
+    ],
+)
 def test_gradients_are_finite_and_equal_differences(name):
     trajectory = ToolTrajectory(PATHS[name], UNIFORM)
     _, gradient = loss(trajectory)

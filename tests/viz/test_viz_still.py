@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -18,10 +20,21 @@ from jffsr.viz.solids import outward, refined, shape_faces
 AROUND = 24 / (2 * np.pi) * np.sin(2 * np.pi / 24)
 
 
+# A planar one, a folded and an open arm, two arms, and the shapeless tree.
+NOW = {"hu_2011_planar2", "canadarm2_7dof", "ets7_6dof", "dual_arm_servicer", "two_arms"}
+some = pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[] if name in NOW else [pytest.mark.slow])
+        for name in (*list_robots(), "two_arms")
+    ],
+)
+
+
 @pytest.fixture(scope="module")
 def stills(robots):
-    """Every robot of the catalogue and the shapeless tree, drawn once."""
-    return {name: draw_still(robot) for name, robot in robots.items()}
+    """Drawings by the robot's name, each made once."""
+    return cache(lambda name: draw_still(robots[name]))
 
 
 def shape(kind, size=(), **more):
@@ -103,9 +116,9 @@ def test_solids_of_wu_end_at_the_published_tool(robots):
     assert np.linalg.norm(hand.mean(axis=0) - [1.37, -0.08, 0.64]) < 0.06
 
 
-@pytest.mark.parametrize("name", [*list_robots(), "two_arms"])
+@some
 def test_every_robot_is_drawn_whole_and_its_joints_are_named(name, robots, stills):
-    robot, still = robots[name], stills[name]
+    robot, still = robots[name], stills(name)
     figure = still.figure
     figure.canvas.draw()
     axes = figure.axes[0]
@@ -132,17 +145,17 @@ def test_every_robot_is_drawn_whole_and_its_joints_are_named(name, robots, still
         assert not any(box.overlaps(other) for other in boxes[:i])
 
 
-@pytest.mark.parametrize("name", list_robots())
+@some
 def test_the_default_posture_keeps_the_limits(name, robots, stills):
-    limits, posture = robots[name].limits, stills[name].posture
+    limits, posture = robots[name].limits, stills(name).posture
     assert np.all(posture >= limits.position_lower)
     assert np.all(posture <= limits.position_upper)
 
 
 def test_a_folded_arm_is_opened_and_an_open_one_left_as_it_is(robots, stills):
-    np.testing.assert_array_equal(stills["ets7_6dof"].posture, 0.0)
+    np.testing.assert_array_equal(stills("ets7_6dof").posture, 0.0)
     # At zero the second boom lies beside the first.
-    robot, posture = robots["canadarm2_7dof"], stills["canadarm2_7dof"].posture
+    robot, posture = robots["canadarm2_7dof"], stills("canadarm2_7dof").posture
     scene = scene_at(robot, np.stack([0 * posture, posture]))
     folded, opened = np.linalg.norm(scene.tools[:, 0] - scene.joints[:, 0], axis=1)
     assert folded < 3
