@@ -12,6 +12,8 @@ import jax
 import pytest
 
 jax.config.update("jax_enable_x64", True)
+# Where in the source an operation was written is looked up for every one, and read by nobody here.
+jax.config.update("jax_traceback_in_locations_limit", 0)
 
 from jffsr.compiling import OPTIONS, forget  # noqa: E402
 

@@ -40,7 +40,13 @@ def batch(shape, spectra=SPECTRA):
     return np.stack(found)
 
 
-@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
+@pytest.mark.parametrize(
+    "shape",
+    [
+        pytest.param(shape, id=name, marks=[] if name in ("square", "wide", "one") else [pytest.mark.slow])
+        for name, shape in SHAPES.items()
+    ],
+)
 def test_bases_are_orthogonal_and_give_the_matrices(shape):
     matrices = batch(shape)
     u, sigma, v = (np.asarray(x) for x in jax.jit(jax.vmap(singular_bases))(matrices))
