@@ -76,10 +76,12 @@ class ClearanceModel:
             pairs = [pair for pair, touching in zip(pairs, joined, strict=True) if not touching]
         if not pairs:
             bare = [name for number, name in enumerate(body_names(topology)[:target]) if not by_body[number]]
-            missing = f"; shapes with the role 'collision' are missing on {', '.join(bare)}" if bare else ""
-            raise InputError(
-                f"clearance: robot '{robot.name}' has no two bodies with shapes that can meet{missing}"
+            missing = (
+                f"; shapes with the role 'collision' (in a URDF <collision>) are missing on {', '.join(bare)}"
+                if bare
+                else ""
             )
+            raise InputError(f"robot '{robot.name}' has no two bodies with shapes that can meet{missing}")
         return cls.of_solids(robot.topology, by_body, pairs)
 
     @classmethod

@@ -54,6 +54,7 @@ class Clearance:
     tolerance: Array | float = 1e-3
     windows: int | None = field(default=None, metadata={"static": True})
     name: str = field(default="clearance", metadata={"static": True})
+    unit, per = "m", MISS
 
     def equality(self, robot: Robot, motion: Motion) -> Array:
         """None."""

@@ -45,6 +45,11 @@ def tolerance_of(constraint: Constraint) -> Array | float:
     return getattr(constraint, "tolerance", DEFAULT_TOLERANCE)
 
 
+def in_units(constraint: Constraint, amount: Array | float) -> tuple[float, str]:
+    """An amount by which a constraint is missed, or may be, in its own unit, and that unit; empty for a ratio."""
+    return float(amount) * getattr(constraint, "per", 1.0), getattr(constraint, "unit", "")
+
+
 def largest_violation(constraint: Constraint, robot: Robot, motion: Motion) -> Scalar:
     """How far the worst of a constraint's equalities is off zero or of its inequalities above it, () >= 0."""
     amounts = jnp.concatenate(
@@ -64,6 +69,7 @@ class FinalAttitude:
     goal: Quaternion
     tolerance: Array | float = 1e-8
     name: str = field(default="final_attitude", metadata={"static": True})
+    unit = "rad"
 
     def equality(self, robot: Robot, motion: Motion) -> Array:
         """Rotation vector of goal^-1 q(T), (3,), rad."""

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jffsr.objectives.clearance import Clearance
-from jffsr.objectives.constraints import tolerance_of
+from jffsr.objectives.constraints import in_units, tolerance_of
 from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
 from jffsr.rollouts.motion import Motion
@@ -131,8 +131,8 @@ def explain(
     elif code is ResultCode.NOT_CONVERGED:
         text = (
             f"accuracy not met: {index} = {cost:.4g} > {accuracy:g}, bound by {binding}{also}; the search was still "
-            f"moving when its budget ended, so raise the budget (a hybrid's are its swarm_evaluations, starts and "
-            f"gradient_iterations), or allow more time or excursion"
+            f"moving when its budget ended, so raise the budget (a hybrid's are its swarm_evaluations, starts, "
+            f"gradient_iterations and polish_iterations), or allow more time or excursion"
         )
     elif code is ResultCode.NOT_VERIFIED:
         text = (
@@ -172,7 +172,9 @@ def constraints_missed(
             if motion is not None and isinstance(constraint, Clearance):
                 near, margin = constraint.nearest(problem.robot, motion), float(np.asarray(constraint.margin))
                 where = f"; at the planner's step {near}, the margin is {margin:g} m"
-            yield f"{constraint.name} by {missed:.3g} (allowed {allowed:g}{where})"
+            (missed, unit), (allowed, _) = (in_units(constraint, amount) for amount in (missed, allowed))
+            unit = f" {unit}" if unit else ""
+            yield f"{constraint.name} by {missed:.3g}{unit} (allowed {allowed:.3g}{unit}{where})"
 
 
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:

@@ -65,6 +65,14 @@ def read_bytes(path: Path, shown: str, expected: str, most: int) -> bytes:
     return data
 
 
+def folders_beside(path: Path) -> list[str]:
+    """Names of the folders in the place of one that is not there."""
+    try:
+        return sorted(other.name for other in path.parent.iterdir() if other.is_dir())
+    except OSError:
+        return []
+
+
 def beside(path: Path, suffixes: tuple[str, ...]) -> list[str]:
     """Names of the files of these kinds in the folder of a file that is not there."""
     try:

@@ -54,7 +54,9 @@ def _collect(path: Path, above: list[Path], documents: list[Document]) -> None:
         raise InputError(f"{source}: the file is empty, a mapping of keys is expected")
     if not isinstance(document.value, dict):
         place = document.marks[()].place
-        raise InputError(f"{place}: a mapping of keys is expected, such as 'kind: planning'")
+        robot = path.suffix.lower() in (".urdf", ".xml", ".mjcf")
+        advice = "; this is a robot's file, and a study names it under the key 'robot'" if robot else ""
+        raise InputError(f"{place}: a mapping of keys is expected, such as 'kind: planning'{advice}")
     chain = [*above, path]
     names = document.value.pop("defaults", None)
     if names is not None and not isinstance(names, list):

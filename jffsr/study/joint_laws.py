@@ -41,14 +41,19 @@ def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: n
     where = config.where(f"task.{key}")
     if value.size != robot.num_joints:
         raise InputError(
-            f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints"
+            f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints "
+            f"({', '.join(robot.joint_names)})"
         )
     for i, name in enumerate(robot.joint_names):
         low, high = robot.limits.position_lower[i], robot.limits.position_upper[i]
         if strict and not (np.isfinite(low) and np.isfinite(high)):
+            suffix, turn = (
+                ("", "[-1, 1]") if robot.topology.joint_types[i] == PRISMATIC else ("_deg", "[-180, 180]")
+            )
             raise InputError(
                 f"{config.where('limits')}: {name} of robot '{robot.name}' has no position limits, which the "
-                f"sine-polynomial law needs; give limits.position_deg or limits.position"
+                f"sine-polynomial law needs; give them by name, such as "
+                f"'limits: {{position{suffix}: {{{name}: {turn}}}}}', or another trajectory.kind"
             )
         inside = low < value[i] < high if strict else low <= value[i] <= high
         if not inside:

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from jffsr.errors import InputError
+from jffsr.reading.did_you_mean import hint
+from jffsr.reading.files import folders_beside
 from jffsr.study.atomic import plain, write_text
 from jffsr.study.config import Study, dump_config, load_config
 from jffsr.study.robot_files import RobotFiles, robot_files
@@ -67,6 +69,10 @@ class RunFolder:
         except NotADirectoryError:
             raise InputError(f"{self.path}: is a file; give the folder of a run") from None
         except FileNotFoundError:
+            if not self.path.is_dir():
+                raise InputError(
+                    f"{self.path}: there is no such folder{hint(self.path.name, folders_beside(self.path))}"
+                ) from None
             raise InputError(f"{self.path}: not a finished run (no summary.json)") from None
         except (OSError, ValueError) as error:
             raise InputError(f"{self.summary}: cannot be read ({error})") from None

@@ -190,10 +190,8 @@ class Task(Section):
         self.check_units("start", "goal")
         if len(self.start_si) != len(self.goal_si):
             start, goal = self.key_of("start"), self.key_of("goal")
-            sentence = (
-                f"found a list of {len(self.goal_si)}, as many numbers as in '{start}' ({len(self.start_si)})"
-            )
-            raise conflict(f"{sentence} are expected, in both one for each joint of the robot", goal)
+            sentence = f"found a list of {len(self.goal_si)}, and of {len(self.start_si)} in '{start}'"
+            raise conflict(f"{sentence}; in both one number for each joint of the robot is expected", goal)
         return self
 
     @property

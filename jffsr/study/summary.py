@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from typing import Any
 
 import numpy as np
 
 from jffsr.objectives.clearance import Clearance
-from jffsr.objectives.constraints import tolerance_of
+from jffsr.objectives.constraints import Constraint, in_units, tolerance_of
+from jffsr.objectives.terms import ROTATION_VECTOR, attitude_angles
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import LIMIT_KINDS, violations
 from jffsr.rollouts.motion import Motion
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
+NOT_LOOKED_AT = "whether bodies touch was not looked at; the key constraints.clearance asks for it"
 _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
 
 
@@ -26,6 +29,8 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
     clearance = [
         one.nearest(problem.robot, plan.motion) for one in problem.constraints if isinstance(one, Clearance)
     ]
+    measures = (getattr(part, "measure", None) for part in (*problem.objective.terms, *problem.constraints))
+    measure = next((found for found in measures if found is not None), ROTATION_VECTOR)
     first = plan.first_at(float(plan.problem.objective.accuracy))
     return {
         "kind": "planning",
@@ -41,7 +46,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
             key: {"value": float(term.value), "unit": units[key], "weighted": float(term.weighted)}
             for key, term in plan.terms.items()
         },
-        "base": _base(plan.motion),
+        "base": _base(plan.motion, measure),
         "nearest_approach": [
             {"bodies": found.pair, "distance_m": found.distance, "time_s": found.time, "sentence": str(found)}
             for found in clearance
@@ -65,13 +70,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
                 key: {"value": float(term.value), "weighted": float(term.weighted)}
                 for key, term in verification.terms.items()
             },
-            "constraints": {
-                constraint.name: {
-                    "violation": float(verification.violations[constraint.name]),
-                    "tolerance": float(tolerance_of(constraint)),
-                }
-                for constraint in plan.problem.constraints
-            },
+            "constraints": constraints_summary(problem.constraints, verification.violations),
             "limits_violated": list(violations(plan.problem, verification.overruns, tolerances)),
             "largest_overrun_relative": {
                 kind: float(np.max(getattr(verification.overruns, kind))) for kind in LIMIT_KINDS
@@ -81,8 +80,8 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
     }
 
 
-def _base(motion: Motion) -> dict[str, float]:
-    """How far the base is turned from its start, and how far its centre of mass has moved."""
+def _base(motion: Motion, measure: str) -> dict[str, float]:
+    """How far the base is turned from its start, in all and about an axis, and how far its centre of mass has moved."""
     start, q = np.asarray(motion.base_quaternion)[0], np.asarray(motion.base_quaternion)
     # Of two unit quaternions: their difference and sum are twice the sine and cosine of a quarter of the turn.
     apart, along = (np.linalg.norm(part, axis=-1) for part in (q - start, q + start))
@@ -91,8 +90,29 @@ def _base(motion: Motion) -> dict[str, float]:
     return {
         "final_turn_rad": float(turn[-1]),
         "largest_turn_rad": float(np.max(turn)),
+        "largest_turn_about_an_axis_rad": float(np.max(np.abs(attitude_angles(motion, measure)))),
         "largest_displacement_m": float(np.max(moved)),
     }
+
+
+def constraints_summary(constraints: Iterable[Constraint], violations: Mapping[str, Any]) -> dict[str, Any]:
+    """How far each constraint is missed and may be, in its unit; without one it is a ratio."""
+    found = {}
+    for constraint in constraints:
+        missed, unit = in_units(constraint, violations[constraint.name])
+        allowed, _ = in_units(constraint, tolerance_of(constraint))
+        found[constraint.name] = {"violation": missed, "tolerance": allowed, "unit": unit}
+    return found
+
+
+def constraint_lines(verification: Mapping[str, Any]) -> list[str]:
+    """A line for each constraint of a verification."""
+    lines = []
+    for name, constraint in verification.get("constraints", {}).items():
+        missed, allowed = _number(constraint["violation"]), _number(constraint["tolerance"])
+        unit = f" {constraint['unit']}" if constraint.get("unit") else ""
+        lines.append(f"  constraint    {name} missed by {missed}{unit} (allowed {allowed}{unit})")
+    return lines
 
 
 def versions() -> dict[str, str]:
@@ -131,9 +151,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         f"position {_number(check['position_difference_m'])} m, "
         f"momentum drift {_number(check['momentum_drift_relative'])}"
     )
-    for name, constraint in check.get("constraints", {}).items():
-        missed, allowed = _number(constraint["violation"]), _number(constraint["tolerance"])
-        lines.append(f"  constraint    {name} missed by {missed} (allowed {allowed})")
+    lines += constraint_lines(check)
     lines += sensitivity_lines(summary.get("sensitivity"))
     lines += robust_lines(summary.get("robust"))
     return "\n".join(lines + last_lines(summary))
@@ -145,14 +163,14 @@ def _motion_lines(summary: dict[str, Any]) -> list[str]:
     if base is not None:
         final, most = (_degrees(base[key]) for key in ("final_turn_rad", "largest_turn_rad"))
         moved = _number(base["largest_displacement_m"])
+        axis = base.get("largest_turn_about_an_axis_rad")
+        about = "" if axis is None else f" ({_degrees(axis)} about one axis, which limits count)"
         lines.append(
-            f"  base          turned by {final} at the end, {most} at most; moved by {moved} m at most"
+            f"  base          turned by {final} at the end, {most} at most{about}; moved by {moved} m at most"
         )
     near = summary.get("nearest_approach")
     if near is not None:
-        told = [found["sentence"] for found in near] or [
-            "not looked at; the key constraints.clearance asks for it"
-        ]
+        told = [found["sentence"] for found in near] or [NOT_LOOKED_AT]
         lines += [f"  clearance     {sentence}" for sentence in told]
     return lines
 

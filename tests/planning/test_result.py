@@ -135,10 +135,10 @@ def test_bodies_that_come_too_near_are_named_with_the_time(robots, problem):
     checked = verification(overruns=overrun(**seven), violations={"clearance": np.array(0.3)})
     found = explain(ResultCode.CONSTRAINTS_VIOLATED, held, checked, TOLERANCES, motion).sentence
     names = " and ".join(model.pair_names[np.argmin(clearances(model, robot, motion)[:, 3])])
-    assert f"clearance by 0.3 (allowed 0.001; at the planner's step {names} " in found
+    assert f"clearance by 0.03 m (allowed 0.0001 m; at the planner's step {names} " in found
     assert "at 6 s, the margin is 0.05 m" in found
     plain = explain(ResultCode.CONSTRAINTS_VIOLATED, held, checked, TOLERANCES).sentence
-    assert "clearance by 0.3 (allowed 0.001)" in plain
+    assert "clearance by 0.03 m (allowed 0.0001 m)" in plain
 
 
 def test_codes_under_vmap_are_int32(problem):

@@ -9,6 +9,7 @@ from jffsr.errors import InputError
 from jffsr.optimizers.registry import GENERATIONAL, OPTIMIZERS
 from jffsr.reading.did_you_mean import listed
 from jffsr.study.config import load_config
+from jffsr.study.run_folder import RunFolder
 
 
 def message(text, *overrides):
@@ -158,7 +159,7 @@ REPLACED = {
     ("30", "{min: 3}"): "x.yaml:6: task.duration.max: missing, this key is required",
     ("30", "{min: 3, max: 2}"): "x.yaml:6: task.duration: min is 3 and max is 2, min < max is expected",
     ("[45, 3]", "[45]"): "x.yaml:5: task.goal_deg: found a list of 1, "
-    "as many numbers as in 'start_deg' (2) are expected, in both one for each joint of the robot",
+    "and of 2 in 'start_deg'; in both one number for each joint of the robot is expected",
     ("[45, 3]", "[45, x]"): "x.yaml:5: task.goal_deg.1: found 'x', a number is expected",
     (
         "[45, 3]",
@@ -330,3 +331,17 @@ def test_overrides_are_a_list_of_texts():
         load_config("x.yaml", "seed=1")
     with pytest.raises(InputError, match="found '3' as an override, a text 'key=value' is expected"):
         load_config("x.yaml", [3])
+
+
+def test_a_robots_file_is_no_study():
+    write("arm.xml", "<robot name='arm'/>\n")
+    with pytest.raises(
+        InputError, match=r"arm\.xml:1: .*a robot's file, and a study names it under the key 'robot'"
+    ):
+        load_config("arm.xml")
+
+
+def test_a_run_that_is_not_there_is_told_with_the_nearest_name(tmp_path):
+    (tmp_path / "tender").mkdir()
+    with pytest.raises(InputError, match=r"tendr: there is no such folder; did you mean 'tender'\?"):
+        RunFolder(tmp_path / "tendr").read_summary()

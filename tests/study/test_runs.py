@@ -64,7 +64,7 @@ def test_folder_holds_what_is_promised(finished):
     assert len(sensitivity["per_percent"]) == 2 * 7
     text = summary_text(summary)
     assert sensitivity["per_percent"][0]["sentence"] in text
-    assert "clearance     not looked at" in text
+    assert "clearance     whether bodies touch was not looked at" in text
     assert summary["terms"]["attitude_change"]["unit"] == "rad"
     assert summary["versions"]["jax"]
     lines = [json.loads(line) for line in (finished / "metrics.jsonl").read_text().splitlines()]
@@ -85,6 +85,8 @@ def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
     replay, report = (page.read_text(encoding="utf-8") for page in pages)
     summary = json.loads((finished / "summary.json").read_text())
     assert html.escape(summary["result"]["sentence"]) in report
+    # Nobody asked whether bodies touch, and the result in words does not say.
+    assert "Whether bodies touch was not looked at" in report
     for term in summary["terms"]:
         assert term.replace("_", " ") in report
     assert report.count("data:image/png;base64,") == len(list((finished / "figures").glob("*.png")))
@@ -102,6 +104,8 @@ def test_the_summary_tells_how_far_the_base_turns(finished):
     )
     turned = Rotation.from_quat(dataset["base_quaternion"].values, scalar_first=True)
     angle = (turned[0].inv() * turned).magnitude()
+    vectors = np.abs((turned[0].inv() * turned).as_rotvec())
+    assert summary["base"]["largest_turn_about_an_axis_rad"] == pytest.approx(vectors.max(), abs=1e-12)
     moved = np.linalg.norm(dataset["base_position"].values - dataset["base_position"].values[0], axis=1)
     assert summary["base"]["final_turn_rad"] == pytest.approx(angle[-1], abs=1e-12)
     assert summary["base"]["largest_turn_rad"] == pytest.approx(angle.max(), abs=1e-12)

@@ -95,5 +95,5 @@ def test_the_target_stands_where_it_is_and_is_coloured_by_its_distance(observed)
 def test_the_report_of_an_observed_capture_has_the_camera_and_the_constraints(observed):
     rows = [row for table in tables_of(run_report(observed, ())) for row in table]
     assert ["observation, camera, rate", "10", "Hz"] in rows
-    assert ["grasp match", "1e-08", "1e-06"] in rows
+    assert ["grasp match", "1e-08", "1e-06", "–"] in rows
     assert ["target, mass", "300", "kg"] in rows

@@ -147,6 +147,8 @@ def test_what_was_varied_has_units_and_what_was_fixed_has_the_rest():
     joints, task, rest = tables_of(fixed(config, ["task.duration", "optimizer.particles"]))
     assert columns_of(joints)["goal [deg]"] == ["120", "-30", "-95", "40", "170", "60"]
     assert task[1] == ["robot", "wu_6dof", ""]
+    _, task_of_own, _ = tables_of(fixed(config, [], "robot/arm.urdf"))
+    assert task_of_own[1] == ["robot", "robot/arm.urdf", ""]
     keys = {row[0] for row in (*task, *rest)}
     assert "duration" not in keys
     assert "optimizer.kind" in keys

@@ -10,12 +10,11 @@ import numpy as np
 from jffsr.capture.front import CaptureFront
 from jffsr.capture.grasp_time import GraspTime
 from jffsr.capture.plan import CapturePlan
-from jffsr.objectives.constraints import tolerance_of
 from jffsr.planning.result import LIMIT_KINDS
 from jffsr.study.capture.building import CaptureStudy
 from jffsr.study.capture.planned import PlannedCapture
 from jffsr.study.capture.schema import CaptureConfig
-from jffsr.study.summary import last_lines, versions
+from jffsr.study.summary import constraint_lines, constraints_summary, last_lines, versions
 from jffsr.types import Array
 
 _PARTS = {"position_m": 0, "attitude_rad": 3, "linear_velocity_m_s": 6, "angular_velocity_rad_s": 9}
@@ -87,13 +86,7 @@ def _verification(plan: CapturePlan) -> dict[str, Any]:
         "position_difference_m": float(found.position_difference),
         "boundary_error": float(found.boundary_error),
         "momentum_drift_relative": float(found.momentum_drift),
-        "constraints": {
-            constraint.name: {
-                "violation": float(found.violations[constraint.name]),
-                "tolerance": float(tolerance_of(constraint)),
-            }
-            for constraint in plan.problem.constraints
-        },
+        "constraints": constraints_summary(plan.problem.constraints, found.violations),
         "largest_overrun_relative": {
             kind: float(np.max(getattr(found.overruns, kind))) for kind in LIMIT_KINDS
         },
@@ -164,9 +157,7 @@ def summary_text(summary: dict[str, Any]) -> str:
             f"position {_number(check['position_difference_m'])} m, "
             f"momentum drift {_number(check['momentum_drift_relative'])}"
         )
-        for name, constraint in check["constraints"].items():
-            missed, allowed = _number(constraint["violation"]), _number(constraint["tolerance"])
-            lines.append(f"  constraint    {name} missed by {missed} (allowed {allowed})")
+        lines += constraint_lines(check)
     return "\n".join(lines + last_lines(summary))
 
 

@@ -21,7 +21,8 @@ def planned_replays(path: Path) -> list[Replay]:
         extras.nearness = {problem.robot.body_names[0]: share.max(axis=1)}
         allowed = ", ".join(f"{angle:.4g}" for angle in np.unique(np.rad2deg(limit[np.isfinite(limit)])))
         extras.legend = (
-            f"The base shows how far it has turned from its start: red at its excursion limit ({allowed} deg).",
+            "The base shows how far it has turned from its start, the worst of its axes: red at the excursion limit "
+            f"of each ({allowed} deg).",
         )
     if "joint_torque" in dataset:
         extras.panels = (torques(dataset),)

@@ -12,6 +12,7 @@ import yaml
 from jffsr.study.building import build_robot
 from jffsr.study.kinds import summary_text
 from jffsr.study.run_folder import RunFolder
+from jffsr.study.summary import NOT_LOOKED_AT
 from jffsr.viz.replay.reading import replays_of
 from jffsr.viz.replay.replay import NothingMoved, Replay
 from jffsr.viz.report.page import page
@@ -28,6 +29,11 @@ _KINDS = {
     "capture": "The capture of a tumbling target",
     "reactionless": "A base held still after contact",
     "chain": "From the first picture of a target to a base that is still",
+}
+_ENDED = {
+    "converged": "it had converged",
+    "budget": "its budget was used up",
+    "target": "its target was reached",
 }
 _TABLES = ("terms_finer", "constraints", "mujoco")
 """Parts of a verification that have tables of their own."""
@@ -46,6 +52,7 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         f"<h1>{escape(name)}</h1>",
         f'<p class="kind">{_KINDS[summary["kind"]]} &middot; robot {escape(str(summary["robot"]))}</p>',
         verdict(summary["result"]),
+        caution(summary.get("nearest_approach") == []),
         section("The motion", motion(lambda: replays_of(folder.path), name)),
         section("The task", _task(config, folder)),
         section("The result", _result(summary, config)),
@@ -62,6 +69,11 @@ def verdict(result: Mapping[str, Any]) -> str:
     return f'<p class="verdict {kind}">{escape(result["sentence"])}</p>'
 
 
+def caution(bodies_may_touch: bool) -> str:
+    """What a result does not say: whether bodies touch, where nobody asked for it."""
+    return f'<p class="verdict caution">{escape(NOT_LOOKED_AT.capitalize())}.</p>' if bodies_may_touch else ""
+
+
 def section(title: str, content: str) -> str:
     """A part of the page; nothing where there is nothing in it."""
     return f"<h2>{escape(title)}</h2>\n{content}" if content else ""
@@ -70,11 +82,9 @@ def section(title: str, content: str) -> str:
 def made(summary: Mapping[str, Any], command: str) -> str:
     """How to make it again, what it cost, and with which versions."""
     rows = [("again", command)]
-    rows += [
-        (name.replace("_", " "), summary[name])
-        for name in ("seed", "seeds", "search_ended")
-        if name in summary
-    ]
+    rows += [(name.replace("_", " "), summary[name]) for name in ("seed", "seeds") if name in summary]
+    if "search_ended" in summary:
+        rows.append(("search ended", _ENDED.get(summary["search_ended"], summary["search_ended"])))
     rows += [
         (f"{what}, {name}", value)
         for what in ("evaluations", "seconds")
@@ -131,13 +141,13 @@ def _verification(summary: Mapping[str, Any]) -> str:
     if summary["kind"] == "tracking" and "momentum_drift" in rest:
         rest["momentum_drift_relative"] = rest.pop("momentum_drift")
     constraints = [
-        (name.replace("_", " "), part["violation"], part["tolerance"])
+        (name.replace("_", " "), part["violation"], part["tolerance"], part.get("unit") or NO_UNIT)
         for name, part in (found.get("constraints") or {}).items()
     ]
     simulators = found.get("mujoco")
     return (
         measured(rest)
         + (OVERRUNS if "largest_overrun_relative" in rest else "")
-        + table(("constraint", "missed by", "allowed"), constraints)
+        + table(("constraint", "missed by", "allowed", "unit"), constraints)
         + ("" if simulators is None else simulators_block(simulators))
     )

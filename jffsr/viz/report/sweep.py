@@ -19,7 +19,7 @@ from jffsr.study.sweep.table import keys_of
 from jffsr.viz.replay.of_sweep import sweep_replays
 from jffsr.viz.report.page import page
 from jffsr.viz.report.pictures import figures_block
-from jffsr.viz.report.report import made, motion, section, verdict
+from jffsr.viz.report.report import caution, made, motion, section, verdict
 from jffsr.viz.report.sweep_findings import best_setting, binding_table, short_points, varied_table
 from jffsr.viz.report.tables import flattened, table
 from jffsr.viz.report.task import is_varied, other_table, shows, task_tables
@@ -43,16 +43,20 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
     except OSError as error:
         raise InputError(f"{folder.path}: cannot be read ({error.strerror or error})") from None
     name, first = str(summary["name"]), expand(read_sweep(str(folder.config)))[0].config
+    # A robot of one's own lies in the folder, wherever that is now.
+    own = Path(first.robot)
+    own = own.relative_to(folder.path.absolute()) if own.is_relative_to(folder.path.absolute()) else own
     varied = keys_of(dataset, seeds=True)
-    robot = "" if "robot" in varied else f" &middot; robot {escape(first.robot)}"
+    robot = "" if "robot" in varied else f" &middot; robot {escape(own.stem)}"
     whole = f"<details><summary>The whole configuration</summary><pre>{escape(text)}</pre></details>"
     parts = [
         f"<h1>{escape(name)}</h1>",
         f'<p class="kind">A sweep of plans{robot}</p>',
         verdict(summary["result"]),
+        caution(first.constraints.clearance is None and "constraints.clearance.margin" not in varied),
         best_setting(dataset),
         section("What was varied", varied_table(dataset)),
-        section("What was fixed", fixed(first, varied) + whole),
+        section("What was fixed", fixed(first, varied, str(own)) + whole),
         section("What was found", from_markdown(found)),
         section("What binds", binding_table(dataset)),
         section("Points that fell short", short_points(dataset)),
@@ -63,9 +67,12 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
     return page(name, "\n".join(part for part in parts if part))
 
 
-def fixed(config: PlanningConfig, varied: Sequence[str]) -> str:
-    """What all points of a sweep share: the joints' start, goal and limits, the task, and folded away all the rest."""
-    values = _plain(config.model_dump())
+def fixed(config: PlanningConfig, varied: Sequence[str], robot: str | None = None) -> str:
+    """What all points of a sweep share: the joints' start, goal and limits, the task, and folded away all the rest.
+
+    robot is what the robot is called here, if not as in the configuration.
+    """
+    values = {**_plain(config.model_dump()), "robot": robot or config.robot}
     shown = (
         other_table(values, varied) if "robot" in varied else task_tables(build_robot(config), values, varied)
     )
