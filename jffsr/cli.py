@@ -102,7 +102,9 @@ def _sweep(arguments: argparse.Namespace) -> int:
         from jffsr.viz.sweep import draw_sweep
 
         draw_sweep(path, ["png"])
-    print(f"\n{sweep.table}\n{spec.name}: {sweep.summary['result']['sentence']}\n  folder  {path}")
+    best = sweep.summary.get("best_setting")
+    told = f"\n  best    {best}" if best else ""
+    print(f"\n{sweep.table}\n{spec.name}: {sweep.summary['result']['sentence']}{told}\n  folder  {path}")
     if sweep.failures:
         print(f"jffsr: {sweep.failures[0]}; the same command tries again", file=sys.stderr)
         return DEFECT

@@ -62,7 +62,7 @@ def draw_convergence(dataset: Dataset) -> Figure:
         mark = {"color": handles[-1].get_color(), "marker": "o" if end >= floor else "v", "markersize": 4}
         axes.plot(spent[-1], max(end, floor), linestyle="none", clip_on=False, zorder=5, **mark)
         handles.append(Line2D([], [], linestyle="none", **mark))
-        labels.append(f"end: J = {end:.2g}")
+        labels.append(f"end: J = {end:.4g}")
     else:
         axes.text(0.5, 0.5, "no finite J was found", transform=axes.transAxes, ha="center", color=GREY)
     axes.set_yscale("log")

@@ -85,6 +85,7 @@ def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
     replay, report = (page.read_text(encoding="utf-8") for page in pages)
     summary = json.loads((finished / "summary.json").read_text())
     assert html.escape(summary["result"]["sentence"]) in report
+    assert f"folder {finished.name}" in report
     # Nobody asked whether bodies touch, and the result in words does not say.
     assert "Whether bodies touch was not looked at" in report
     for term in summary["terms"]:

@@ -106,6 +106,13 @@ def test_its_own_configuration_repeats_it(finished, tmp_path):
     assert (tmp_path / "again/sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
 
 
+def test_the_best_setting_is_told(finished, capsys):
+    assert cli.main(["sweep", str(finished / "config.yaml"), "--out", str(finished)]) == cli.NOT_MET
+    summary = json.loads((finished / "summary.json").read_text())
+    assert summary["best_setting"].startswith("task.duration = ")
+    assert f"  best    {summary['best_setting']}" in capsys.readouterr().out
+
+
 def test_run_takes_a_sweep_too(finished, capsys):
     assert cli.main(["run", str(finished / "config.yaml"), "--out", str(finished)]) == cli.NOT_MET
     assert "is finished" in capsys.readouterr().out

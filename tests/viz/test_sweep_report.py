@@ -94,8 +94,14 @@ def test_every_setting_says_what_binds_in_its_best_run():
     assert columns["limit with least left"] == [
         "joint rate, over by 12.5 %",
         "base excursion, 12.5 % left",
-        "joint rate, 0 % left",
+        "joint rate, less than 0.01 % left",
     ]
+    # A law that goes as far as the position limits allow, and never beyond, hides what else binds.
+    touching = merged_sweep().assign(overrun_position=("point", np.full(6, -1e-9)))
+    (table,) = tables_of(binding_table(touching, ("position",)))
+    assert columns_of(table) == columns
+    (table,) = tables_of(binding_table(touching))
+    assert columns_of(table)["limit with least left"][1] == "joint position, less than 0.01 % left"
 
 
 def test_points_that_fell_short_say_why():

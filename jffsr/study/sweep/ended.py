@@ -12,6 +12,7 @@ from jffsr.errors import InputError
 from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import open_dataset
 from jffsr.study.summary import versions
+from jffsr.study.sweep.best import find_best
 from jffsr.study.sweep.folder import SweepFolder
 from jffsr.study.sweep.merging import FAILURE, MISSING
 from jffsr.study.sweep.specification import read_sweep
@@ -24,6 +25,7 @@ def summary_of(dataset: Any, name: str) -> dict[str, Any]:
     code = dataset["code"].values
     failed = failures_of(dataset)
     met = int(np.count_nonzero(code == ResultCode.ACCURACY_MET))
+    best = find_best(dataset)
     lost = f"; {len(failed)} could not be computed" if failed else ""
     return {
         "kind": "sweep",
@@ -35,6 +37,7 @@ def summary_of(dataset: Any, name: str) -> dict[str, Any]:
         "points": int(code.size),
         "computed": int(code.size - len(failed)),
         "met": met,
+        "best_setting": None if best is None else best.sentence,
         "failures": _grouped(failed),
         "evaluations": {
             "objective": int(dataset["evaluations"].values.sum()),

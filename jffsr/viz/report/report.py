@@ -48,9 +48,10 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
     config = yaml.safe_load(folder.config.read_text(encoding="utf-8"))
     summary = folder.read_summary()
     name = str(summary.get("name", folder.path.name))
+    kind = f"{_KINDS[summary['kind']]} &middot; robot {escape(str(summary['robot']))}"
     parts = [
         f"<h1>{escape(name)}</h1>",
-        f'<p class="kind">{_KINDS[summary["kind"]]} &middot; robot {escape(str(summary["robot"]))}</p>',
+        f'<p class="kind">{kind}{_where(folder, name)}</p>',
         verdict(summary["result"]),
         caution(summary.get("nearest_approach") == []),
         section("The motion", motion(lambda: replays_of(folder.path), name)),
@@ -61,6 +62,12 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         section("How it was made", made(summary, f"jffsr run {folder.config.name}")),
     ]
     return page(name, "\n".join(part for part in parts if part))
+
+
+def _where(folder: RunFolder, name: str) -> str:
+    """The folder's name, where it tells this run from others of the same study."""
+    own = folder.path.absolute().name
+    return "" if own == name else f" &middot; folder {escape(own)}"
 
 
 def verdict(result: Mapping[str, Any]) -> str:

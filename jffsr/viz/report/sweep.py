@@ -48,6 +48,8 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
     own = own.relative_to(folder.path.absolute()) if own.is_relative_to(folder.path.absolute()) else own
     varied = keys_of(dataset, seeds=True)
     robot = "" if "robot" in varied else f" &middot; robot {escape(own.stem)}"
+    touched = first.trajectory.keeps_position and not is_varied("trajectory.kind", varied)
+    by_law = ("position",) if touched else ()
     whole = f"<details><summary>The whole configuration</summary><pre>{escape(text)}</pre></details>"
     parts = [
         f"<h1>{escape(name)}</h1>",
@@ -58,7 +60,7 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
         section("What was varied", varied_table(dataset)),
         section("What was fixed", fixed(first, varied, str(own)) + whole),
         section("What was found", from_markdown(found)),
-        section("What binds", binding_table(dataset)),
+        section("What binds", binding_table(dataset, by_law)),
         section("Points that fell short", short_points(dataset)),
         section("Figures", figures_block(figures)),
         section("The best motions", _BEST + motion(lambda: sweep_replays(folder.path), name)),

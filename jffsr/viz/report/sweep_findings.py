@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jffsr.planning.result import ResultCode
+from jffsr.study.sweep.best import best_point, find_best, unit_of
 from jffsr.study.sweep.compute import OVERRUN
 from jffsr.study.sweep.ended import failures_of
 from jffsr.study.sweep.merging import MISSING
-from jffsr.study.sweep.points import value_text
 from jffsr.study.sweep.significance import ranked_cost
-from jffsr.study.sweep.table import Row, keys_of, rows_of
+from jffsr.study.sweep.table import keys_of, rows_of
 from jffsr.viz.report.tables import number, table
 
 if TYPE_CHECKING:
@@ -32,44 +32,35 @@ def varied_table(dataset: Dataset) -> str:
         values = list(dict.fromkeys(dataset[key].values.tolist()))
         shown = ", ".join(number(value) for value in values[:_MOST_VALUES])
         more = f" and {len(values) - _MOST_VALUES} more" if len(values) > _MOST_VALUES else ""
-        rows.append((key, len(values), shown + more, _unit(dataset, key)))
+        rows.append((key, len(values), shown + more, unit_of(dataset, key)))
     return table(("key", "how many", "values", "unit"), rows)
 
 
 def best_setting(dataset: Dataset) -> str:
-    """The setting most of whose runs met their accuracy, among equals that with the least median J, in a sentence."""
-    rows = [row for row in rows_of(dataset) if np.any(np.isfinite(row.cost))]
-    if not rows:
+    """The best setting in a sentence, and what makes it the best."""
+    best = find_best(dataset)
+    if best is None:
         return "<p>No point of this sweep has a value of J.</p>"
-    best = min(rows, key=lambda row: (-np.mean(row.code == ResultCode.ACCURACY_MET), _median(row.cost)))
-    met, count = int(np.count_nonzero(best.code == ResultCode.ACCURACY_MET)), best.points.size
-    point = _best_point(best)
-    cost = float(dataset["cost"].values[point])
-    accuracy = float(dataset.attrs.get("accuracy", np.nan))
-    asked = f" (J at most {accuracy:.4g})" if np.isfinite(accuracy) else ""
-    if count == 1:
-        found = f"J {cost:.4g}, accuracy{asked} {'met' if met else 'not met'}"
-    else:
-        values = f"J at best {cost:.4g}, median {_median(best.cost):.4g}"
-        found = f"accuracy{asked} met by {met} of its {count} runs, {values}"
-    whole = sum(bool(np.all(row.code == ResultCode.ACCURACY_MET)) for row in rows)
     return (
-        f'<p class="verdict {"met" if met else "missed"}">Best setting: {escape(_values(best, dataset))}: {found}.</p>'
+        f'<p class="verdict {"met" if best.met else "missed"}">Best setting: {escape(best.sentence)}.</p>'
         "<p>That is the setting most of whose runs met their accuracy, and among equals the one with the least "
-        f"median J. Of {len(rows)} settings {whole} met it in every run.</p>"
+        f"median J. Of {best.settings} settings {best.whole} met it in every run.</p>"
     )
 
 
-def binding_table(dataset: Dataset) -> str:
-    """For each setting what binds in its best run: the costliest term and the limit that has least left."""
+def binding_table(dataset: Dataset, kept_by_law: Collection[str] = ()) -> str:
+    """For each setting what binds in its best run: the costliest term and the limit that has least left.
+
+    kept_by_law names limits, such as position, that the joint law touches without ever going beyond: they say nothing.
+    """
     keys, rows, limited = keys_of(dataset), [], False
     for row in rows_of(dataset)[:_MOST_SETTINGS]:
         values = list(row.values.values())
         if not np.any(np.isfinite(row.cost)):
             rows.append((*values, None, "no run has a value", "", ""))
             continue
-        point = _best_point(row)
-        limit = _nearest_limit(dataset, point)
+        point = best_point(row)
+        limit = _nearest_limit(dataset, point, kept_by_law)
         limited = limited or bool(limit)
         rows.append((*values, float(dataset["cost_finer"].values[point]), *_costliest(dataset, point), limit))
     heads = [*keys, "J of the best run", "term that costs most", "its share"]
@@ -148,14 +139,14 @@ def _costliest(dataset: Dataset, point: int) -> tuple[str, str]:
     return str(dataset["term"].values[most]).replace("_", " "), f"{100 * weighted[most] / total:.0f} %"
 
 
-def _nearest_limit(dataset: Dataset, point: int) -> str:
+def _nearest_limit(dataset: Dataset, point: int, without: Collection[str] = ()) -> str:
     """The limit with the least left, or overrun the most; an empty text where there is none."""
     overruns: Mapping[str, float] = {
         name.removeprefix(OVERRUN): float(dataset[name].values[point])
         for name in map(str, dataset.data_vars)
         if name.startswith(OVERRUN)
     }
-    finite = {name: value for name, value in overruns.items() if np.isfinite(value)}
+    finite = {name: value for name, value in overruns.items() if np.isfinite(value) and name not in without}
     if not finite:
         return ""
     name = max(finite, key=lambda kind: finite[kind])
@@ -163,30 +154,4 @@ def _nearest_limit(dataset: Dataset, point: int) -> str:
     kind = "base excursion" if name == "excursion" else f"joint {name}"
     if finite[name] > _KEPT:
         return f"{kind}, over by {over:.3g} %"
-    return f"{kind}, {max(-over, 0.0):.3g} % left"
-
-
-def _best_point(row: Row) -> int:
-    """The number of a setting's point with the least J among those that met their accuracy, else among all."""
-    met = row.code == ResultCode.ACCURACY_MET
-    cost = np.where(met, row.cost, np.inf) if met.any() else row.cost
-    return int(row.points[np.argmin(np.where(np.isnan(cost), np.inf, cost))])
-
-
-def _median(cost: np.ndarray) -> float:
-    return float(np.quantile(cost, 0.5, method="linear" if np.all(np.isfinite(cost)) else "nearest"))
-
-
-def _values(row: Row, dataset: Dataset) -> str:
-    """A setting as a person writes it, with units."""
-    parts = [f"{key} = {_value(value)} {_unit(dataset, key)}".strip() for key, value in row.values.items()]
-    return ", ".join(parts) or "the only one"
-
-
-def _value(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else value_text(value)
-
-
-def _unit(dataset: Dataset, key: str) -> str:
-    unit = str(dataset[key].attrs.get("units", "1"))
-    return "" if unit == "1" else unit
+    return f"{kind}, less than 0.01 % left" if over > -0.01 else f"{kind}, {-over:.3g} % left"
