@@ -12,11 +12,20 @@ from jffsr.compiling import Program
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
 from jffsr.optimizers.constraints import split
 from jffsr.planning.plan import Plan
+from jffsr.planning.problem import Problem
 from jffsr.writing import write_atomically
 
 _attitude_angles = Program(attitude_angles, static_argnums=1, once=True)
 _SECOND = {"revolute": "rad", "prismatic": "m"}
 _EFFORT = {"revolute": "N m", "prismatic": "N"}
+
+
+def excursion_limit(problem: Problem) -> tuple[np.ndarray, str]:
+    """How far the base may turn about each axis, (3,), rad, infinite without a limit, and how its turn is measured."""
+    for term in problem.objective.terms:
+        if isinstance(term, AttitudeExcursion):
+            return np.asarray(term.limit), term.measure
+    return np.full(3, np.inf), ROTATION_VECTOR
 
 
 def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
@@ -31,10 +40,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
         meaning = "violation of the constraints by the best so far"
         missed["history_violation"] = ("iteration", violation, {"units": "1", "long_name": meaning})
     unit = "/".join(sorted({_SECOND[kind] for kind in robot.topology.joint_types}))
-    excursion, measure = np.full(3, np.inf), ROTATION_VECTOR
-    for term in plan.problem.objective.terms:
-        if isinstance(term, AttitudeExcursion):
-            excursion, measure = np.asarray(term.limit), term.measure
+    excursion, measure = excursion_limit(plan.problem)
     limits = robot.limits
 
     def of(dims, values, units, meaning):

@@ -11,10 +11,11 @@ import numpy as np
 
 from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.constraints import Constraint, in_units, tolerance_of
-from jffsr.objectives.terms import ROTATION_VECTOR, attitude_angles
+from jffsr.objectives.terms import attitude_angles
 from jffsr.planning.plan import Plan
 from jffsr.planning.result import LIMIT_KINDS, violations
 from jffsr.rollouts.motion import Motion
+from jffsr.study.dataset import excursion_limit
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
@@ -29,8 +30,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
     clearance = [
         one.nearest(problem.robot, plan.motion) for one in problem.constraints if isinstance(one, Clearance)
     ]
-    measures = (getattr(part, "measure", None) for part in (*problem.objective.terms, *problem.constraints))
-    measure = next((found for found in measures if found is not None), ROTATION_VECTOR)
+    _, measure = excursion_limit(problem)
     first = plan.first_at(float(plan.problem.objective.accuracy))
     return {
         "kind": "planning",

@@ -9,16 +9,17 @@ import numpy as np
 
 from jffsr.compiling import program
 from jffsr.errors import InputError
-from jffsr.objectives.terms import ROTATION_VECTOR, attitude_angles
+from jffsr.objectives.terms import attitude_angles
 from jffsr.planning.problem import Problem
 from jffsr.study.building import build_problem
-from jffsr.study.dataset import open_dataset
+from jffsr.study.dataset import excursion_limit, open_dataset
 from jffsr.study.sweep.ended import read_ended
 from jffsr.study.sweep.folder import SweepFolder
 from jffsr.study.sweep.points import expand, value_text
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.table import rows_of
 from jffsr.types import Vector
+from jffsr.viz.replay.of_plan import excursion
 from jffsr.viz.replay.of_robot import robot_replay
 from jffsr.viz.replay.replay import NothingMoved, Replay
 
@@ -58,16 +59,17 @@ def sweep_replays(path: Path) -> list[Replay]:
     ]
 
 
-@program(once=True)
-def _motion(problem: Problem, free: Vector):
+@program(static_argnums=2, once=True)
+def _motion(problem: Problem, free: Vector, measure: str):
     motion = problem.motion(free)
-    return motion, attitude_angles(motion, ROTATION_VECTOR)
+    return motion, attitude_angles(motion, measure)
 
 
 def _replay(problem: Problem, free: np.ndarray, title: str, together: int) -> Replay:
     import xarray
 
-    motion, angles = jax.device_get(_motion(problem, free[: problem.bounds()[0].shape[0]]))
+    limit, measure = excursion_limit(problem)
+    motion, angles = jax.device_get(_motion(problem, free[: problem.bounds()[0].shape[0]], measure))
     dataset = xarray.Dataset(
         {
             "joint_position": (("time", "joint"), motion.joint_position),
@@ -79,4 +81,5 @@ def _replay(problem: Problem, free: np.ndarray, title: str, together: int) -> Re
         },
         coords={"time": np.asarray(motion.time)},
     )
-    return robot_replay(title, problem.robot, dataset, together=together)
+    extras = excursion(problem.robot, angles, limit)
+    return robot_replay(title, problem.robot, dataset, extras, together=together)
