@@ -10,7 +10,9 @@ def nearest(name: str, candidates: Iterable[str], count: int = 1) -> list[str]:
     """Up to `count` of the candidates that look most like `name`, best first; empty when none is close."""
     by_folded = {candidate.casefold(): candidate for candidate in candidates}
     matches = difflib.get_close_matches(name.casefold()[:200], list(by_folded), n=count, cutoff=0.6)
-    return [by_folded[match] for match in matches]
+    # What is cut short looks little like the whole: `poly` for `polynomial`.
+    matches += [long for long in by_folded if len(name) > 2 and long.startswith(name.casefold())]
+    return [by_folded[match] for match in dict.fromkeys(matches)][:count]
 
 
 def hint(name: str, candidates: Iterable[str]) -> str:

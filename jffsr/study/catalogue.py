@@ -9,6 +9,7 @@ from textwrap import wrap
 import numpy as np
 
 from jffsr.robots.builder import build_robot
+from jffsr.robots.geometry import COLLISION, VISUAL, Shape
 from jffsr.robots.loading import describe_robot, list_robots
 from jffsr.robots.robot import PRISMATIC, Robot
 
@@ -68,12 +69,18 @@ def robot_text(name: str, width: int | None = None) -> str:
     return "\n".join(lines)
 
 
+def _kind(shape: Shape) -> str:
+    """A shape's kind, with what it is for where that is one thing alone."""
+    use = {(VISUAL,): " to be seen", (COLLISION,): " to be kept clear"}
+    return shape.kind + use.get(tuple(shape.roles), "")
+
+
 def _bodies(robot: Robot) -> list[str]:
     column = 2 + max(len("body"), *map(len, robot.body_names))
     lines = [f"{'body':<{column}}{'mass kg':>10}   {'principal moments kg m^2':<34}shapes"]
     for body, mass, inertia in zip(robot.body_names, robot.mass, robot.inertia, strict=True):
         moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(inertia))
-        kinds = Counter(shape.kind for shape in robot.geometry.on_body(body))
+        kinds = Counter(_kind(shape) for shape in robot.geometry.on_body(body))
         shapes = ", ".join(kind if count == 1 else f"{count} {kind}" for kind, count in kinds.items())
         lines.append(f"{body:<{column}}{float(mass):>10.6g}   {moments:<34}{shapes or 'none'}")
     lines.append(f"{'in all':<{column}}{float(np.sum(robot.mass)):>10.6g}")

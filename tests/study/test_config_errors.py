@@ -345,3 +345,9 @@ def test_a_run_that_is_not_there_is_told_with_the_nearest_name(tmp_path):
     (tmp_path / "tender").mkdir()
     with pytest.raises(InputError, match=r"tendr: there is no such folder; did you mean 'tender'\?"):
         RunFolder(tmp_path / "tendr").read_summary()
+
+
+def test_a_value_that_is_cut_short_is_known():
+    write("x.yaml", GOOD)
+    with pytest.raises(InputError, match="did you mean 'polynomial'"):
+        load_config("x.yaml", ["trajectory.kind=poly"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from jffsr.study.config import load_config
 from jffsr.study.run_folder import RunFolder, claim_run_folder
 from jffsr.study.sweep.folder import claim_sweep_folder
 from jffsr.study.sweep.specification import read_sweep
+from jffsr.viz.report.report import _robot
 
 CAPTURE = next((Path(__file__).parents[2] / "configs" / "capture").glob("tumbling*.yaml"))
 ARM = """\
@@ -130,3 +132,13 @@ def test_a_sweep_carries_every_robot(tmp_path, project):
     assert [float(load_robot(robot).mass.sum()) for robot in again.robots] == masses
     assert len(again.robots) == 3
     claim_sweep_folder(again, found)  # goes on where it lies now
+
+
+def test_a_report_holds_the_robot(tmp_path, project):
+    """Its numbers and its file's text, so that a motion can be made again from the page alone."""
+    claim_run_folder(load_config(project / "arms" / "urdf" / "task.yaml"), tmp_path / "run")
+    found = _robot(RunFolder(elsewhere(tmp_path, project)))
+    assert escape(ARM.strip().splitlines()[0]) in found
+    assert "robot/urdf/arm.urdf" in found
+    assert "end effectors: " in found
+    assert str(tmp_path) not in found

@@ -117,7 +117,7 @@ def test_what_came_of_runs_stands_side_by_side(tmp_path):
     assert found["term joint rate, weighted"] == ("1", "0.125")
     assert found["attitude difference [rad]"] == ("1e-07", "1e-07")
     assert found["nearest approach, 1"] == ("–", "hand and base, 0.1 m at 3 s")
-    assert found["base, final turn [rad]"] == ("–", "0.5")
+    assert found["base, final turn [deg]"] == ("–", "28.65")
     # What only one of them has is missing in the other.
     assert found["hold, base rate [rad/s]"] == ("–", "0.002")
     assert not any("code" in name or "finer" in name for name in found)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -147,7 +148,10 @@ def _numbers(summary: Mapping[str, Any]) -> dict[str, Any]:
         plain = {key: value for key, value in section.items() if key not in _SKIPPED}
         for key, value in flattened(plain):
             if isinstance(value, (int, float)) and key != "code":
-                found[f"{part}.{key}"] = value
+                # Limits and plots are in degrees.
+                turn = part == "base" and key.endswith("_rad")
+                shown = (key.removesuffix("_rad") + "_deg", math.degrees(value)) if turn else (key, value)
+                found[f"{part}.{shown[0]}"] = shown[1]
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from datetime import date
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import yaml
 
 from jffsr.study.building import build_robot
+from jffsr.study.catalogue import robot_text
 from jffsr.study.kinds import summary_text
 from jffsr.study.run_folder import RunFolder
 from jffsr.study.summary import NOT_LOOKED_AT
@@ -35,6 +37,7 @@ _ENDED = {
     "budget": "its budget was used up",
     "target": "its target was reached",
 }
+_TEXTS, _LONGEST, _WIDTH = (".urdf", ".xml", ".mjcf", ".yaml", ".yml"), 100_000, 110
 _TABLES = ("terms_finer", "constraints", "mujoco")
 """Parts of a verification that have tables of their own."""
 
@@ -98,7 +101,8 @@ def made(summary: Mapping[str, Any], command: str) -> str:
         for name, value in (summary.get(what) or {}).items()
     ]
     versions = ", ".join(f"{name} {version}" for name, version in summary.get("versions", {}).items())
-    return table(("", ""), [*rows, ("versions", versions)])
+    rows += [("versions", versions), ("report written", date.today().isoformat())]
+    return table(("", ""), rows)
 
 
 def motion(find: Callable[[], Sequence[Replay]], name: str) -> str:
@@ -112,7 +116,18 @@ def motion(find: Callable[[], Sequence[Replay]], name: str) -> str:
 def _task(config: Mapping[str, Any], folder: RunFolder) -> str:
     text = escape(folder.config.read_text(encoding="utf-8"))
     whole = f"<details><summary>The whole configuration</summary><pre>{text}</pre></details>"
-    return task_tables(build_robot(folder.read_config()), config) + whole
+    return task_tables(build_robot(folder.read_config()), config) + whole + _robot(folder)
+
+
+def _robot(folder: RunFolder) -> str:
+    """The robot in full, and the text of the files of one that is not of the catalogue, folded away."""
+    parts = [robot_text(str(folder.read_config().robot), _WIDTH)]
+    for file in sorted((folder.path / "robot").rglob("*")):
+        if file.suffix.lower() in _TEXTS and file.stat().st_size < _LONGEST:
+            name = file.relative_to(folder.path).as_posix()
+            parts.append(f"{name}\n\n{file.read_text(encoding='utf-8', errors='replace')}")
+    blocks = "".join(f"<pre>{escape(part)}</pre>" for part in parts)
+    return f"<details><summary>The robot</summary>{blocks}</details>"
 
 
 def _result(summary: Mapping[str, Any], config: Mapping[str, Any]) -> str:

@@ -17,6 +17,7 @@ _ENDINGS = {
 }
 _NAMES = {
     "momentum_drift": "N s, N m s",
+    "boundary_error": "rad or m, s",
     "duration": "s",
     "window": "s",
     "time": "s",
