@@ -70,6 +70,10 @@ class Clearance:
         distances = clearances(self.model, robot, poses, states)
         return (jnp.asarray(self.margin) + smooth_max(-jnp.asarray(distances), self.width, axis=1)) / MISS
 
+    def distances(self, robot: Robot, motion: Motion) -> Array:
+        """Signed distances of all pairs at the motion's samples, (p, N + 1), m; of a known motion on the host."""
+        return clearances(self.model, robot, motion, self._target_states(motion))
+
     def nearest(self, robot: Robot, motion: Motion) -> NearestApproach:
         """Which pair comes nearest in a motion that is known, how near and when; host only."""
         return nearest_approach(self.model, robot, motion, self._target_states(motion))

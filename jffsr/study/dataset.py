@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from jffsr.compiling import Program
+from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.terms import ROTATION_VECTOR, AttitudeExcursion, attitude_angles
 from jffsr.optimizers.constraints import split
 from jffsr.planning.plan import Plan
@@ -43,10 +44,13 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
     excursion, measure = excursion_limit(plan.problem)
     limits = robot.limits
 
-    def of(dims, values, units, meaning):
-        dims = dims if isinstance(dims, tuple) else (dims,)
-        return dims, np.asarray(values), {"units": units, "long_name": meaning}
-
+    apart, pairs, margin = {}, {}, {}
+    for constraint in plan.problem.constraints:
+        if isinstance(constraint, Clearance):
+            distances = constraint.distances(robot, motion)
+            apart["clearance"] = of(("pair", "time"), distances, "m", "signed distance of two bodies")
+            pairs["pair"] = ("pair", [" and ".join(pair) for pair in constraint.model.pair_names])
+            margin["margin"] = float(np.asarray(constraint.margin))
     torque = {}
     if motion.joint_torque is not None:
         force = "/".join(sorted({_EFFORT[kind] for kind in robot.topology.joint_types}))
@@ -93,6 +97,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "history_best_value": of("iteration", best, "1", "best index so far"),
             "free_numbers": of("free", plan.free, "1", "free numbers of the trajectory"),
             **missed,
+            **apart,
         },
         coords={
             "time": ("time", np.asarray(motion.time), {"units": "s"}),
@@ -100,6 +105,7 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "axis": ("axis", ["x", "y", "z"]),
             "component": ("component", ["w", "x", "y", "z"]),
             "twist": ("twist", ["vx", "vy", "vz", "wx", "wy", "wz"]),
+            **pairs,
         },
         attrs={
             "name": name,
@@ -107,12 +113,14 @@ def plan_dataset(plan: Plan, name: str, phase_names: list[str]):
             "phase_names": json.dumps(phase_names),
             "accuracy": float(plan.problem.objective.accuracy),
             "index": float(plan.cost),
+            **margin,
         },
     )
 
 
 def of(dims, values, units: str, meaning: str):
-    """A variable with its dimensions, units and what it is."""
+    """A variable with its dimension, or a tuple of them, its units and what it is."""
+    dims = dims if isinstance(dims, tuple) else (dims,)
     return dims, np.asarray(values), {"units": units, "long_name": meaning}
 
 

@@ -14,10 +14,10 @@ from jffsr.capture.grasp_time_curves import GraspCandidate, GraspScan
 from jffsr.robots.geometry import Geometry
 from jffsr.robots.robot import Robot
 from jffsr.viz.base import draw_base
-from jffsr.viz.capture_clearance import draw_clearance
 from jffsr.viz.capture_front import draw_front
 from jffsr.viz.capture_scene import draw_capture
 from jffsr.viz.capture_tool import draw_capture_tool
+from jffsr.viz.clearance import draw_clearance
 from jffsr.viz.grasp_time import draw_grasp_time
 from jffsr.viz.joints import draw_joints
 from jffsr.viz.save import KINDS, save_figure

@@ -15,6 +15,7 @@ from PIL import Image
 from jffsr.errors import InputError
 from jffsr.robots.robot import Robot
 from jffsr.viz.base import draw_base
+from jffsr.viz.clearance import draw_clearance
 from jffsr.viz.convergence import draw_convergence
 from jffsr.viz.joints import draw_joints
 from jffsr.viz.motion import draw_robot
@@ -35,7 +36,8 @@ def save_figures(
 ) -> list[Path]:
     """Write joints, base, convergence and robot as .png (200 dpi) and .pdf, or one of them, into `folder`; their paths.
 
-    dataset is a run's result.nc. The folder is made where it is missing. A file appears whole or not at all.
+    Where bodies were to keep apart there is clearance, too. dataset is a run's result.nc. The folder is made where it
+    is missing. A file appears whole or not at all.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -45,6 +47,8 @@ def save_figures(
         "convergence": draw_convergence(dataset),
         "robot": draw_robot(robot, dataset),
     }
+    if "clearance" in dataset:
+        figures["clearance"] = draw_clearance(dataset)
     return [path for name, figure in figures.items() for path in save_figure(figure, folder / name, kinds)]
 
 

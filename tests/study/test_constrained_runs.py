@@ -23,6 +23,7 @@ from jffsr.study.config import load_config
 from jffsr.study.dataset import open_dataset
 from jffsr.study.planning import run_planning
 from jffsr.study.summary import summary_text
+from jffsr.study.sweep.misses import misses_of
 
 CONFIG = """\
 kind: planning
@@ -165,6 +166,10 @@ def test_a_batch_is_planned_under_its_own_constraints(config):
     assert plans.result[2] == ResultCode.CONSTRAINTS_VIOLATED
     missed = plans.verification.violations["final_attitude"]
     assert missed[2] > 0.5
+    told = misses_of(problems, plans.verification.violations)
+    off = np.abs(np.angle(np.exp(1j * (angles - goals))))
+    np.testing.assert_allclose(told["constraint_missed"][:, 0], off, atol=1e-3)
+    assert told["constraint_units"].tolist() == ["rad"]
     assert np.all(plans.cost < 1e6)
     for i, single in enumerate(problems):
         found = Feasible(single).evaluation(plans.free[i])
@@ -174,4 +179,4 @@ def test_a_batch_is_planned_under_its_own_constraints(config):
         assert code == plans.result[i]
     sentence = explain(plans.result[2], problems[2], checked, Tolerances()).sentence
     assert sentence.startswith("constraints violated on the finer grid: final_attitude by ")
-    assert "(allowed 0.0001)" in sentence
+    assert "(allowed 0.0001 rad)" in sentence

@@ -117,6 +117,13 @@ def test_points_that_fell_short_say_why():
     assert why[2] == "a limit is not kept: joint rate, over by 12.5 %"
     assert why[3].startswith("not verified: the finer re-run differs by 0.0002 rad")
     assert "3 points missed their accuracy, 1 could not be computed" in html
+    constrained = merged_sweep((ResultCode.CONSTRAINTS_VIOLATED, *[MET] * 5))
+    (row,) = tables_of(short_points(constrained))[0][1:]
+    assert row[-1] == "a constraint is missed"
+    for name, value in (("missed_clearance", 0.03), ("allowed_clearance", 1e-4)):
+        constrained[name] = ("point", np.full(6, value), {"units": "m"})
+    (row,) = tables_of(short_points(constrained))[0][1:]
+    assert row[-1] == "clearance missed by 0.03 m (allowed 0.0001 m)"
     assert short_points(dataset.isel(point=[2, 5])) == ""
 
 

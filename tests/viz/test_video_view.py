@@ -17,6 +17,7 @@ from jffsr.viz.replay.film.timing import film_timing
 from jffsr.viz.replay.film.viewpoint import view_axes
 from jffsr.viz.replay.film.words import Words
 from jffsr.viz.replay.replay import Replay, Solid
+from jffsr.viz.replay.shading import AT, NEAR
 from jffsr.viz.replay.video import save_video
 
 
@@ -112,6 +113,28 @@ def test_the_normals_of_a_fine_tube_point_away_from_its_axis_on_both_sides():
     outward = vertices[faces] * [1.0, 1.0, 0.0]
     np.testing.assert_allclose(normals[: len(faces)], outward, atol=0.03)
     np.testing.assert_allclose(normals[len(faces) :], -outward[:, ::-1], atol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("nearest", "amber", "red"), [(None, 0, 0), (0.5, 0, 0), (0.8, 1, 0), (1.2, 1, 1), (np.nan, 1, 1)]
+)
+def test_the_strip_says_what_the_colours_mean_that_come_up(nearest, amber, red):
+    nearness = None if nearest is None else np.array([0.1, 0.2, nearest, 0.1, 0.0])
+    replay = two_boxes(span=8.0, nearness=nearness)
+    timing = film_timing([replay], 30)
+    picture = Words([replay], tiles(1, 1280, 720), 1280, 720, timing).onto(
+        np.zeros((720, 1280, 3), np.uint8), 0.0
+    )
+    strip = picture[720 - strip_height(720) :]
+    for colour, squares in ((NEAR, amber), (AT, red)):
+        here = np.all(strip == np.round(255 * np.array(colour)).astype(int), axis=2)
+        # A square of twelve pixels, or thirteen.
+        assert (here.sum() in (144, 156, 169)) if squares else not here.any()
+    # The mark's name and the clock keep clear of them.
+    line = (strip[strip.shape[0] // 2 :].max(axis=2) > 60).any(axis=0)
+    assert line[24:200].any()
+    assert line[610:670].any()
+    assert not line[680:740].any()
 
 
 def test_title_clock_and_bar_are_written():

@@ -11,10 +11,10 @@ import jffsr
 from jffsr.capture.grasp_time import GraspTimeCode
 from jffsr.robots.geometry import BOX, Geometry, Shape
 from jffsr.viz.capture import grasp_time_of, save_capture_figures
-from jffsr.viz.capture_clearance import draw_clearance
 from jffsr.viz.capture_front import draw_front
 from jffsr.viz.capture_scene import draw_capture
 from jffsr.viz.capture_tool import draw_capture_tool
+from jffsr.viz.clearance import draw_clearance
 
 GEOMETRY = Geometry((Shape("hull", BOX, "target", np.zeros(3), np.eye(3), np.array([0.2, 0.3, 0.1])),))
 

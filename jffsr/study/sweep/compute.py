@@ -11,6 +11,7 @@ import numpy as np
 from jffsr.optimizers.constraints import split
 from jffsr.planning.many import PlanHistory, Plans, plan_many
 from jffsr.planning.plan import Plan, solve
+from jffsr.study.sweep.misses import misses_of
 from jffsr.study.sweep.tasks import Task
 
 STEPS_KEPT = 200
@@ -26,7 +27,7 @@ def run_task(task: Task) -> Results:
     if task.width is None:
         with jax.enable_x64(task.settings[0].precision == "float64"):
             plans = _alone(task)
-        return _results(plans, task.settings[0].precision)
+        return _results(plans, task, task.settings[0].precision)
     with jax.enable_x64(True):
         # A task of which something is done already is filled up, so that it is the same program.
         settings, seeds = (_filled(values, task.width) for values in (task.settings, task.seeds))
@@ -42,7 +43,7 @@ def run_task(task: Task) -> Results:
             with_history=True,
         )
     count = len(task.numbers)
-    return _results(jax.tree.map(lambda leaf: leaf[:count], plans))
+    return _results(jax.tree.map(lambda leaf: leaf[:count], plans), task)
 
 
 def _filled(values: Sequence[Any], width: int) -> list[Any]:
@@ -76,7 +77,7 @@ def _alone(task: Task) -> Plans:
     return jax.tree.map(lambda leaf: np.asarray(leaf)[None], plans)
 
 
-def _results(plans: Plans, precision: str = "float64") -> Results:
+def _results(plans: Plans, task: Task, precision: str = "float64") -> Results:
     check, history = plans.verification, plans.history
     names = sorted(check.terms)
     kept = _kept(history.best_value.shape[1])
@@ -96,6 +97,7 @@ def _results(plans: Plans, precision: str = "float64") -> Results:
         "boundary_error": check.boundary_error,
         "momentum_drift": check.momentum_drift,
         "violation": np.max(missed, axis=0) if missed else np.zeros(len(plans.cost)),
+        **misses_of([setting.problem for setting in task.settings], check.violations),
         **{
             f"{OVERRUN}{kind}": np.max(values, axis=-1, initial=-np.inf)
             for kind, values in vars(check.overruns).items()

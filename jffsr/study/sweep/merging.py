@@ -11,6 +11,7 @@ import numpy as np
 
 from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.compute import OVERRUN
+from jffsr.study.sweep.misses import merged_misses
 from jffsr.study.sweep.parts import Part
 from jffsr.study.sweep.points import Point, value_text
 
@@ -29,7 +30,10 @@ _UNITS = {
     "attitude_difference": ("rad", "largest difference of the base attitude to the finer re-run"),
     "position_difference": ("m", "largest difference of the base position to the finer re-run"),
     "boundary_error": ("1", "largest miss of the joint motion asked for at both ends, rad or m and s"),
-    "violation": ("1", "largest violation of a constraint in the finer re-run, 0 where all are kept"),
+    "violation": (
+        "1",
+        "largest violation of a constraint in the finer re-run, as the search counts it; 0: all kept",
+    ),
     "momentum_drift": ("1", "relative drift of the momentum in the finer re-run"),
 }
 _COUNTS = ("code", "evaluations", "gradient_evaluations")
@@ -73,6 +77,7 @@ def merged(
             if quantity in part.results:
                 values[list(part.numbers)] = part.results[quantity]
         variables[quantity] = ("point", values, {"units": unit, "long_name": meaning})
+    variables |= merged_misses(count, parts)
     variables["free_numbers"] = (
         ("point", "free"),
         _padded(count, parts, "free_numbers"),

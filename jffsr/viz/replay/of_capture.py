@@ -28,11 +28,7 @@ def captured_replays(path: Path) -> list[Replay]:
     folder, study, dataset, _ = open_capture(path)
     if "joint_position" not in dataset:
         raise NothingMoved(f"{folder.path}: the run found no plan, so that nothing moves in it")
-    return [
-        robot_replay(
-            run_name(folder), study.robot, dataset, capture_extras(study.robot, study.geometry, dataset)
-        )
-    ]
+    return [robot_replay(run_name(folder), study.robot, dataset, capture_extras(study.geometry, dataset))]
 
 
 def chained_replays(path: Path) -> list[Replay]:

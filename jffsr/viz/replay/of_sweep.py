@@ -19,7 +19,7 @@ from jffsr.study.sweep.points import expand, value_text
 from jffsr.study.sweep.specification import read_sweep
 from jffsr.study.sweep.table import rows_of
 from jffsr.types import Vector
-from jffsr.viz.replay.of_plan import excursion
+from jffsr.viz.replay.of_plan import planned_extras
 from jffsr.viz.replay.of_robot import robot_replay
 from jffsr.viz.replay.replay import NothingMoved, Replay
 
@@ -81,5 +81,5 @@ def _replay(problem: Problem, free: np.ndarray, title: str, together: int) -> Re
         },
         coords={"time": np.asarray(motion.time)},
     )
-    extras = excursion(problem.robot, angles, limit)
+    extras = planned_extras(problem, dataset, limit)
     return robot_replay(title, problem.robot, dataset, extras, together=together)

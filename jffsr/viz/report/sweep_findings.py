@@ -13,6 +13,7 @@ from jffsr.study.sweep.best import best_point, find_best, unit_of
 from jffsr.study.sweep.compute import OVERRUN
 from jffsr.study.sweep.ended import failures_of
 from jffsr.study.sweep.merging import MISSING
+from jffsr.study.sweep.misses import missed_in_words
 from jffsr.study.sweep.significance import ranked_cost
 from jffsr.study.sweep.table import keys_of, rows_of
 from jffsr.viz.report.tables import number, table
@@ -117,7 +118,8 @@ def _why(dataset: Dataset, point: int) -> str:
             f"{value('momentum_drift'):.2g} relative; raise rollout.num_steps"
         )
     if code == ResultCode.CONSTRAINTS_VIOLATED:
-        return f"a constraint is missed by {value('violation'):.3g}"
+        # A sweep of an earlier version does not say which.
+        return "; ".join(missed_in_words(dataset, point)) or "a constraint is missed"
     limit = _nearest_limit(dataset, point)
     if code == ResultCode.LIMITS_VIOLATED:
         return f"a limit is not kept: {limit}"

@@ -1,4 +1,4 @@
-"""What is written into a film: titles, what the lines are, the clock, the speed, and a bar of the time."""
+"""What is written into a film: titles, what lines and colours are, the clock, the speed, and a bar of the time."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from jffsr.viz.replay.film.sky import paled
 from jffsr.viz.replay.film.tiles import Tile, strip_height
 from jffsr.viz.replay.film.timing import Timing, speed_text
 from jffsr.viz.replay.replay import Colour, Replay
+from jffsr.viz.replay.shading import AT, FAR, STATES, warned
 
 _INK, _QUIET, _STRIP, _RAIL, _BAR = (
     (236, 240, 247),
@@ -77,9 +78,12 @@ class Words:
         left, right, top, thick = self._rail
         top, line = top - self._top, self._line - self._top
         draw.rectangle((left, top, right, top + thick - 1), fill=_RAIL)
-        draw.text((right, line), _speed(self._timing.speed), _QUIET, self._small, "rm")
+        speed = _speed(self._timing.speed)
+        draw.text((right, line), speed, _QUIET, self._small, "rm")
+        taken = right - max(120 * self._unit, draw.textlength(speed, self._small) + 40 * self._unit)
         span = self._timing.end - self._timing.start
         free = left + draw.textlength("0000.000 s", self._large)
+        gaps = [(free, taken)]
         for name, instant in sorted(
             {mark for replay in replays for mark in replay.marks}, key=lambda m: m[1]
         ):
@@ -90,10 +94,31 @@ class Words:
             half = 0.5 * draw.textlength(name, self._small)
             centre = min(max(place, free + half), right - half)
             # Where names would cover each other, the later one is left out.
-            if abs(centre - place) <= half and centre + half < right - 120 * self._unit:
+            if abs(centre - place) <= half and centre + half < taken:
                 draw.text((centre, line), name, _QUIET, self._small, "mm")
                 free = centre + half + 12 * self._unit
+                gaps[-1:] = [(gaps[-1][0], centre - half), (free, taken)]
+        self._write_colours(draw, line, gaps, colours_shown(replays))
         return image
+
+    def _write_colours(
+        self,
+        draw: ImageDraw.ImageDraw,
+        line: float,
+        gaps: Sequence[tuple[float, float]],
+        colours: Sequence[tuple[Colour, str]],
+    ) -> None:
+        """What the colours of bodies mean, at the end of the last gap that has room for it."""
+        side = 12 * self._unit
+        widths = [3.6 * side + draw.textlength(meaning, self._small) for _, meaning in colours]
+        ends = [end for start, end in gaps if end - start >= sum(widths)]
+        if not colours or not ends:
+            return
+        left = ends[-1] - sum(widths)
+        for (colour, meaning), width in zip(colours, widths, strict=True):
+            draw.rectangle((left, line - 0.5 * side, left + side, line + 0.5 * side), fill=_ink(colour))
+            draw.text((left + 1.6 * side, line), meaning, _QUIET, self._small, "lm")
+            left += width
 
     def _write_tile(
         self, draw: ImageDraw.ImageDraw, replay: Replay, tile: Tile, framed: bool, known: set
@@ -132,6 +157,15 @@ class Words:
             draw.rectangle((left, line - half, left + dash, line + half), fill=(*_ink(colour), 255))
             draw.text((left + 1.4 * dash, line), name, (*_QUIET, 255), self._small, "lm")
             left = end + 1.2 * dash
+
+
+def colours_shown(replays: Sequence[Replay]) -> list[tuple[Colour, str]]:
+    """Those of the colours of bodies near their limits that come up, and what they mean."""
+    found = [s.nearness for replay in replays for s in replay.solids if s.nearness is not None]
+    nearest = float(np.max(np.nan_to_num(np.concatenate(found), nan=np.inf))) if found else 0.0
+    if nearest <= FAR:
+        return []
+    return [(colour, meaning) for colour, meaning in STATES if colour != AT or warned(colour, nearest) == AT]
 
 
 def _keys(replay: Replay) -> list[tuple[str, Colour, bool]]:

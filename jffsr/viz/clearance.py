@@ -1,4 +1,4 @@
-"""How far bodies keep apart during a capture, against the margin."""
+"""How far bodies keep apart over a motion, against the margin."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OTHERS = {"color": "0.8", "linewidth": 0.6, "zorder": 1}
 def draw_clearance(dataset: Dataset) -> Figure:
     """Signed distances over time, m, of the six pairs of bodies that come nearest, the others pale; the margin shaded.
 
-    dataset is the result.nc of a capture that keeps its bodies apart.
+    dataset is the result.nc of a plan or a capture that keeps its bodies apart.
     """
     distances, time = dataset["clearance"].values, dataset["time"].values
     names = [str(name) for name in dataset["pair"].values]
