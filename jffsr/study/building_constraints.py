@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from jffsr.clearance.model import ClearanceModel
+from jffsr.clearance.reports import nearest_approach
 from jffsr.errors import InputError
 from jffsr.objectives.clearance import MISS, Clearance
 from jffsr.objectives.constraints import BaseExcursion, Constraint, FinalAttitude, joint_limits
@@ -41,10 +43,35 @@ def build_constraints(config: PlanningConfig, robot: Robot) -> tuple[Constraint,
     return tuple(found)
 
 
+class _Still(NamedTuple):
+    base_position: np.ndarray
+    base_quaternion: np.ndarray
+    joint_position: np.ndarray
+    time: np.ndarray = np.zeros(1)
+
+
 def _clearance(config: PlanningConfig, robot: Robot) -> Clearance:
     try:
         model = ClearanceModel.create(robot)
     except InputError as error:
         raise InputError(f"{config.where('constraints.clearance')}: {error}") from error
     wanted = config.constraints.clearance
+    for end in ("start", "goal"):
+        _check_end(config, robot, model, end)
     return Clearance(model, np.asarray(wanted.margin), tolerance=np.asarray(wanted.tolerance / MISS))
+
+
+def _check_end(config: PlanningConfig, robot: Robot, model: ClearanceModel, end: str) -> None:
+    """InputError where two bodies are nearer than the margin at the start or goal, which every motion goes through."""
+    wanted, task = config.constraints.clearance, config.task
+    pose = _Still(*(np.array([x]) for x in (task.base_position, task.base_quaternion, task.si(end))))
+    near = nearest_approach(model, robot, pose)
+    if near.distance < wanted.margin - wanted.tolerance:
+        first, second = near.pair
+        how = (
+            f"overlap by {-near.distance:.4g} m" if near.distance < 0 else f"are {near.distance:.4g} m apart"
+        )
+        where, key = config.where(f"task.{task.key_of(end)}"), "constraints.clearance.margin"
+        raise InputError(
+            f"{where}: {first} and {second} {how} at the {end}; at least '{key}' is expected, {wanted.margin:g} m"
+        )

@@ -53,6 +53,30 @@ def test_goal_may_be_a_quaternion_or_an_angle_in_rad():
     )
 
 
+@pytest.mark.parametrize(
+    ("joints", "said"),
+    [
+        # The second link, a tube of radius 0.05 m, folds back to the base: its rim is 1 + cos - 0.05 sin from it.
+        (
+            "start_deg: [0, 165], goal_deg: [0, 90]",
+            r":3: task.start_deg: base and link2 are 0.02113 m apart at the start",
+        ),
+        (
+            "start: [0, 1.5], goal: [0, 2.87979327]",
+            r":3: task.goal: base and link2 are 0.02113 m apart at the goal",
+        ),
+    ],
+)
+def test_bodies_too_near_at_either_end_are_told(joints, said):
+    text = PLANAR.replace("start_deg: [90, 30], goal_deg: [-60, 90]", joints)
+    config = load(text + "constraints: {clearance: {margin: 0.03}}\n")
+    with pytest.raises(
+        InputError, match=f"{said}; at least 'constraints.clearance.margin' is expected, 0.03 m"
+    ):
+        build_problem(config)
+    build_problem(load(text + "constraints: {clearance: {margin: 0.0212, tolerance: 1e-4}}\n"))
+
+
 def test_written_out_and_read_again_is_the_same():
     config = load(PLANAR + "constraints: {final_attitude: {angle_deg: 30}, joint_limits: {}}\n")
     again = load(dump_config(config))
