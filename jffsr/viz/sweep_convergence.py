@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -25,8 +26,8 @@ def draw_sweep_convergence(dataset: Dataset) -> Figure | None:
     """Median best J over the runs against objective and gradient evaluations together, with its quartiles.
 
     A line for each optimizer, or else for each setting; a panel for each of the other settings, the first six, whose
-    axis ends four decades under the accuracy. Nothing is drawn until half of the runs have found a finite J. None where
-    no step was kept or the lines are too many.
+    axis ends four decades under the accuracy. Nothing is drawn until half of the runs have found a finite J; a panel in
+    which that never happens says so. None where it happens in no panel, no step was kept, or the lines are too many.
     """
     keys = keys_of(dataset)
     of_lines = [OPTIMIZER] if OPTIMIZER in keys else keys
@@ -35,16 +36,19 @@ def draw_sweep_convergence(dataset: Dataset) -> Figure | None:
     panels = rows_of(dataset, of_panels)[:_MOST_PANELS]
     if not 1 <= len(lines) <= _MOST_LINES or not dataset.sizes.get("step"):
         return None
+    curves = [_curves(dataset.isel(point=panel.points), of_lines, lines) for panel in panels]
+    if not any(curves):
+        return None
     columns = min(2, len(panels))
     deep = -(-len(panels) // columns)
     figure = new_figure(0.5 + 1.9 * deep, 3.5 * (1 if columns == 1 else 1.6))
     grid = figure.subplots(deep, columns, squeeze=False, sharex=True)
-    for axes, panel in zip(grid.flat, panels, strict=False):
-        for order, values in enumerate(lines):
-            rows = rows_of(dataset.isel(point=panel.points), of_lines)
-            runs = next((row.points for row in rows if row.values == values), np.zeros(0, int))
-            if runs.size:
-                _draw(axes, dataset.isel(point=panel.points[runs]), level_look(order))
+    for axes, panel, found in zip(grid.flat, panels, curves, strict=False):
+        for order, curve in found.items():
+            _draw(axes, curve, level_look(order))
+        if not found:
+            words = "no J in half of the runs"
+            axes.text(0.5, 0.4, words, transform=axes.transAxes, ha="center", color=GREY)
         axes.set_xscale("log")
         axes.set_yscale("log")
         if dataset.attrs["accuracy"] > 0:
@@ -66,21 +70,45 @@ def draw_sweep_convergence(dataset: Dataset) -> Figure | None:
     return figure
 
 
-def _draw(axes, runs: Dataset, look: dict) -> None:
+class _Curve(NamedTuple):
+    """After `at` evaluations, (k,), quartiles of the best J; infinite where too few runs have found one."""
+
+    at: np.ndarray
+    lower: np.ndarray
+    middle: np.ndarray
+    upper: np.ndarray
+
+
+def _curves(panel: Dataset, keys: Sequence[str], lines: Sequence[dict]) -> dict[int, _Curve]:
+    """The curves of a panel by their places among the lines; none of what half of the runs never found."""
+    found = {}
+    for row in rows_of(panel, keys):
+        curve = _curve(panel.isel(point=row.points))
+        if curve is not None and np.any(np.isfinite(curve.middle)):
+            found[lines.index(row.values)] = curve
+    return found
+
+
+def _curve(runs: Dataset) -> _Curve | None:
     spent = runs["history_evaluations"].values + runs["history_gradient_evaluations"].values
     best = np.where(np.isnan(runs["history_best_value"].values), np.inf, runs["history_best_value"].values)
     known = spent[np.isfinite(spent)]
     if not known.size:
-        return
+        return None
     at = np.geomspace(max(known.min(), 1), max(known.max(), 2), _GRID)
     values = np.stack([_held(one, cost, at) for one, cost in zip(spent, best, strict=True)])
-    middle = np.median(values, axis=0)
     # Beside a run that has found nothing yet there is nothing to interpolate.
     lower, upper = np.quantile(values, [0.25, 0.75], axis=0, method="nearest")
-    half = np.isfinite(middle)
-    axes.plot(at[half], middle[half], **look)
-    full = half & np.isfinite(upper)
-    axes.fill_between(at[full], lower[full], upper[full], color=look["color"], alpha=0.15, linewidth=0)
+    return _Curve(at, lower, np.median(values, axis=0), upper)
+
+
+def _draw(axes, curve: _Curve, look: dict) -> None:
+    half = np.isfinite(curve.middle)
+    axes.plot(curve.at[half], curve.middle[half], **look)
+    full = half & np.isfinite(curve.upper)
+    axes.fill_between(
+        curve.at[full], curve.lower[full], curve.upper[full], color=look["color"], alpha=0.15, linewidth=0
+    )
 
 
 def _held(spent: np.ndarray, best: np.ndarray, at: np.ndarray) -> np.ndarray:

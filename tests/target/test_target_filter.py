@@ -89,6 +89,7 @@ def test_unseen_poses_leave_the_prediction_alone(followed):
     assert spread[35] < spread[29]
 
 
+@pytest.mark.slow
 def test_a_target_that_jumps_is_told_as_lost(followed):
     seen, run, _ = followed
     jumped = run(replace(seen, position=seen.position.at[40:].add(2.0)))

@@ -124,6 +124,10 @@ def test_points_that_fell_short_say_why():
         constrained[name] = ("point", np.full(6, value), {"units": "m"})
     (row,) = tables_of(short_points(constrained))[0][1:]
     assert row[-1] == "clearance missed by 0.03 m (allowed 0.0001 m)"
+    constrained["code"].values[0] = NOT_VERIFIED
+    (row,) = tables_of(short_points(constrained))[0][1:]
+    assert row[-1].startswith("not verified: the finer re-run differs")
+    assert row[-1].endswith("; clearance missed by 0.03 m (allowed 0.0001 m)")
     assert short_points(dataset.isel(point=[2, 5])) == ""
 
 

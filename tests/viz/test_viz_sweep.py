@@ -168,6 +168,20 @@ def test_convergence_ends_at_the_median_of_the_runs(dataset):
     np.testing.assert_allclose(ends, expected, rtol=1e-12)
 
 
+def test_convergence_of_settings_in_which_nothing_was_found(dataset, tmp_path):
+    """As where no search met its constraints: such a panel says so, and of such alone there is no figure."""
+    changed = dataset.copy(deep=True)
+    lost = changed["task.duration"].values == 15
+    changed["history_best_value"].values[lost] = np.inf
+    figure = draw_sweep_convergence(changed)
+    figure.savefig(tmp_path / "convergence.png")
+    said = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+    assert said == [["no J in half of the runs"]] * 2 + [[]] * 4
+    assert len(figure.axes[0].lines) == 1  # the accuracy
+    changed["history_best_value"].values[:] = np.inf
+    assert draw_sweep_convergence(changed) is None
+
+
 def test_show_draws_a_sweep(dataset, tmp_path, capsys):
     save_dataset(dataset, tmp_path / "sweep.nc", {"optimizer.kind": {"dtype": "S1"}})
     summary = {"kind": "sweep", "name": "made_up", "result": {"code": 1, "sentence": "some met"}}

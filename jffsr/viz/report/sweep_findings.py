@@ -112,14 +112,16 @@ def _why(dataset: Dataset, point: int) -> str:
     code = int(dataset["code"].values[point])
     if code == ResultCode.NOT_FINITE:
         return "the motion is not finite"
+    missed = missed_in_words(dataset, point)
     if code == ResultCode.NOT_VERIFIED:
-        return (
+        words = (
             f"not verified: the finer re-run differs by {value('attitude_difference'):.2g} rad, the momentum drifts by "
             f"{value('momentum_drift'):.2g} relative; raise rollout.num_steps"
         )
+        return "; ".join((words, *missed))
     if code == ResultCode.CONSTRAINTS_VIOLATED:
         # A sweep of an earlier version does not say which.
-        return "; ".join(missed_in_words(dataset, point)) or "a constraint is missed"
+        return "; ".join(missed) or "a constraint is missed"
     limit = _nearest_limit(dataset, point)
     if code == ResultCode.LIMITS_VIOLATED:
         return f"a limit is not kept: {limit}"

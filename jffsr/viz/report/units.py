@@ -75,6 +75,8 @@ _PLACES = {
     "hold.sensors.gyro": "rad/s",
     "hold.sensors.encoder": "rad or m",
     "hold.sensors.rate": "rad/s or m/s",
+    "constraints.clearance.tolerance": "m",
+    "constraints.final_attitude.tolerance": "rad",
     "task.duration.min": "s",
     "task.duration.max": "s",
     "target.shapes.size": "m",
