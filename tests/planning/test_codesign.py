@@ -36,6 +36,7 @@ def test_no_change_is_the_same_robot(robots):
         jax.tree.map(np.testing.assert_array_equal, robots[name], same)
 
 
+@pytest.mark.slow
 def test_a_whole_turn_of_one_link_answers_as_its_closed_form():
     """The base's turn is -pi (1 + (a - c)/S): Hu's base and first link, the link larger, its joint further out."""
     whole = describe_robot("hu_2011_planar2")

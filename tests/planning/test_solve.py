@@ -57,7 +57,7 @@ def planned(problem, **keywords):
 
 @pytest.fixture(scope="module")
 def plan(problem):
-    return planned(problem, with_sensitivity=True)
+    return planned(problem)
 
 
 def test_plan_is_consistent(problem, plan):
@@ -76,7 +76,9 @@ def test_plan_is_consistent(problem, plan):
     assert plan.seconds["total"] >= plan.seconds["run"] >= 0
 
 
-def test_sensitivity_is_that_of_the_chosen_free_numbers(problem, plan):
+@pytest.mark.slow
+def test_sensitivity_is_that_of_the_chosen_free_numbers(problem):
+    plan = planned(problem, with_sensitivity=True)
     assert plan.sensitivity.bodies == problem.robot.body_names
     expected = sensitivity(problem, plan.free)
     np.testing.assert_array_equal(plan.sensitivity.derivative.tool.inertia, expected.derivative.tool.inertia)

@@ -52,6 +52,7 @@ def test_the_index_is_that_of_the_robots_one_by_one(problem, both, measure, leve
     chex.assert_tree_all_finite(smooth)
 
 
+@pytest.mark.slow
 def test_certain_numbers_leave_the_nominal_index(problem, both):
     certain = Uncertainty.sampled(problem.robot, 3, "cvar", mass=0.0, inertia=0.0, length=0.0)
     (_, value), _ = both(replace(problem, uncertainty=certain), FREE)

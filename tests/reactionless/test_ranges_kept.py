@@ -161,6 +161,7 @@ def test_rate_limits_come_before_the_ranges(name):
     assert rates[0] < 0
 
 
+@pytest.mark.slow
 def test_a_hold_that_left_a_range_stays_inside():
     """Sixteen seconds of the published arm with its load, the momentum pushing a joint to the end 0.03 rad away."""
     load, momentum = (

@@ -90,7 +90,8 @@ def test_every_robot_of_the_catalogue(robots, place):
     _compare([robots[name] for name in groups[place]])
 
 
-@pytest.mark.parametrize("kinds", [pytest.param("both", marks=pytest.mark.slow), "slides"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kinds", ["both", "slides"])
 def test_a_tree_with_several_tips(robots, kinds):
     robot = robots["two_arms"]
     assert {REVOLUTE, PRISMATIC} == set(robot.topology.joint_types)
