@@ -41,7 +41,7 @@ def _check_posture(config: PlanningConfig, robot: Robot, quantity: str, value: n
     where = config.where(f"task.{key}")
     if value.size != robot.num_joints:
         raise InputError(
-            f"{where}: found {value.size} numbers, robot '{robot.name}' has {robot.num_joints} joints "
+            f"{where}: found a list of {value.size}, robot '{robot.name}' has {robot.num_joints} joints "
             f"({', '.join(robot.joint_names)})"
         )
     for i, name in enumerate(robot.joint_names):

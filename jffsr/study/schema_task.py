@@ -188,10 +188,6 @@ class Task(Section):
     @model_validator(mode="after")
     def _check(self) -> Task:
         self.check_units("start", "goal")
-        if len(self.start_si) != len(self.goal_si):
-            start, goal = self.key_of("start"), self.key_of("goal")
-            sentence = f"found a list of {len(self.goal_si)}, and of {len(self.start_si)} in '{start}'"
-            raise conflict(f"{sentence}; in both one number for each joint of the robot is expected", goal)
         return self
 
     @property

@@ -18,7 +18,7 @@ def start_state(config: RobotStudy, robot: Robot) -> State:
     where, q = config.where(f"task.{task.key_of('start')}"), np.array(task.si("start"))
     if q.size != robot.num_joints:
         raise InputError(
-            f"{where}: found {q.size} numbers, robot '{robot.name}' has {robot.num_joints} joints"
+            f"{where}: found a list of {q.size}, robot '{robot.name}' has {robot.num_joints} joints"
         )
     lower, upper = robot.limits.position_lower, robot.limits.position_upper
     for i in np.flatnonzero((q < lower) | (q > upper)):

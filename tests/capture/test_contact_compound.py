@@ -95,6 +95,7 @@ def test_the_planar_capture_of_paper_002():
     np.testing.assert_allclose(locked.contact.energy_lost, 0.3125 - 1.25**2 / about_com / 2, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_target_on_the_base_moves_its_centre_of_mass():
     whole = describe_robot("ye_2019_planar3")
     dock = EndEffectorDescription("dock", "base", np.array([-0.2, 0.1, 0.0]), np.eye(3))

@@ -134,7 +134,8 @@ print("loaded" if loaded else "compiled", counts.get("cache_hits", 0), np.asarra
 """
 
 
-@pytest.mark.parametrize("rounds", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("rounds", [1, 2])
 def test_other_processes_find_it_and_its_lapack_calls_work(tmp_path, rounds):
     """Base twists need LAPACK. In each round a process finds it in JAX's cache alone, the next what that one kept."""
     environment = {**os.environ, "JFFSR_CACHE_DIR": str(tmp_path)}

@@ -103,7 +103,7 @@ def assert_same(one, other):
 
 every = pytest.mark.parametrize("kind", OPTIMIZERS)
 # Those that compile for long under vmap; what is theirs alone stands in their own tests.
-LONG = {"hybrid", "memetic", "ssade", "cma_es", "ga", "ga_binary"}
+LONG = {"hybrid", "memetic", "ssade", "cma_es", "ga", "ga_binary", "gradient", "evosax", "pso"}
 
 
 @every

@@ -106,6 +106,7 @@ def test_problems_of_other_structure_are_refused(problems, robots):
         plan_many([])
 
 
+@pytest.mark.slow
 def test_tables_hold_the_motion(problems, tmp_path):
     plan = solve(problems[0], "qpso", SETTINGS, with_sensitivity=False)
     assert plan.sensitivity is None

@@ -132,8 +132,10 @@ def test_other_numbers_share_the_compiled_programs(robot):
 
 
 @pytest.mark.parametrize("count", [50, pytest.param(1000, marks=pytest.mark.slow)])
-def test_many_plans_of_one_robot_compile_nothing_again(robot, plan, count):
+def test_many_plans_of_one_robot_compile_nothing_again(robot, problem, plan, count):
     """Tasks, durations, masses and seeds vary; budgets, being traced, are cut to a few evaluations."""
+    if count > 50:
+        planned(problem, with_sensitivity=True)
     few = replace(SETTINGS, swarm_evaluations=8, gradient_iterations=1, polish_iterations=1)
     draw = np.random.default_rng(0)
     for seed in range(count):
@@ -141,7 +143,9 @@ def test_many_plans_of_one_robot_compile_nothing_again(robot, plan, count):
         problem = wu6_problem(
             other, num_steps=20, duration=draw.uniform(25, 40), start=START + draw.normal(0, 0.02, 6)
         )
-        found = solve(problem, "hybrid", few, seed=seed, chunk=6, tolerances=COARSE)
+        found = solve(
+            problem, "hybrid", few, seed=seed, chunk=6, tolerances=COARSE, with_sensitivity=count > 50
+        )
         # What was traced would have been compiled, and counted here.
         assert found.seconds["compile"] == 0
         assert np.isfinite(found.cost)

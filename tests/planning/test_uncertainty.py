@@ -34,7 +34,14 @@ def both():
     return jax.jit(lambda problem, free: (problem.smooth_and_value(free), problem.value(free)))
 
 
-@pytest.mark.parametrize(("measure", "level"), [("expected", 0.0), ("worst_case", 1.0), ("cvar", 0.6)])
+@pytest.mark.parametrize(
+    ("measure", "level"),
+    [
+        pytest.param("expected", 0.0, marks=pytest.mark.slow),
+        pytest.param("worst_case", 1.0, marks=pytest.mark.slow),
+        ("cvar", 0.6),
+    ],
+)
 def test_the_index_is_that_of_the_robots_one_by_one(problem, both, measure, level):
     uncertain = replace(
         problem, uncertainty=Uncertainty.sampled(problem.robot, COUNT, measure, level=level, seed=3)

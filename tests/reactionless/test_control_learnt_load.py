@@ -45,6 +45,7 @@ def test_with_the_true_load_the_plant_accelerates_as_wanted():
     np.testing.assert_allclose(found[6:], wanted, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_an_unknown_load_is_held_by_what_was_learnt():
     whole = loaded()
     rates = np.array([0.1, -0.1, 0.2])

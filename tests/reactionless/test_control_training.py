@@ -35,6 +35,7 @@ def problem():
     return MachineTraining(robots, stacked(START, START), references, keys, controller, settings, NODES)
 
 
+@pytest.mark.slow
 def test_the_value_is_the_error_of_the_runs(problem):
     candidate = np.linspace(-1, 1, 6 * NODES)
     weights, bias = machine_weights(candidate)

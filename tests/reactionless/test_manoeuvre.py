@@ -59,6 +59,7 @@ def test_mujoco_sees_no_angular_momentum_with_the_base_still(found):
     assert worst < 1e-5 * largest
 
 
+@pytest.mark.slow
 def test_limits_are_looked_at(found):
     """Ranges and rates that the way does not keep; of rates, the duration that would do."""
     fastest = float(np.abs(found.path.joint_velocity).max())

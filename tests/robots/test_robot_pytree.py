@@ -50,6 +50,7 @@ def compiled():
     return robot, jax.jit(chex.assert_max_traces(_loss, n=1)), jax.jit(jax.grad(_loss))(robot)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("field", FIELDS)
 def test_gradient_is_the_finite_difference(compiled, field):
     """Along one random direction of each field: a wrong or missing part would show."""
@@ -69,12 +70,14 @@ def test_gradient_is_the_finite_difference(compiled, field):
     np.testing.assert_allclose(found, expected, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_all_gradients_are_finite(compiled):
     robot, _, gradient = compiled
     chex.assert_trees_all_equal_shapes(gradient, robot)
     chex.assert_tree_all_finite(gradient)
 
 
+@pytest.mark.slow
 def test_other_numbers_do_not_retrace(compiled):
     """The counter raises on a second trace of the function behind `value`."""
     robot, value, _ = compiled

@@ -148,6 +148,7 @@ def test_a_held_torque_gives_mujocos_motion(robot, driven, start):
     assert np.abs(ours.joint_position[-1] - start.joint_position).max() > 0.1
 
 
+@pytest.mark.slow
 def test_the_gradient_in_the_torque_is_the_difference(driven, start):
     def end(scale):
         return driven(start, STEPS, False, scale).base_position[-1, 0]

@@ -154,7 +154,7 @@ def test_the_published_attitude_is_made_unit_and_noted():
             "observation.camera.rate: found 0, a number in (0, 1000] Hz is expected",
         ),
         (["robot=servicer_7"], "robot: "),
-        (["task.start_deg=[0, 0]"], "found 2 numbers, robot 'servicer_7dof' has 7 joints"),
+        (["task.start_deg=[0, 0]"], "found a list of 2, robot 'servicer_7dof' has 7 joints"),
         (["task.end_effector=hand"], "task.end_effector: found 'hand', robot 'servicer_7dof' has tool"),
     ],
 )

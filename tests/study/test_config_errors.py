@@ -8,6 +8,7 @@ from config_files import GOOD, folder, load, write  # noqa: F401 (the fixture ac
 from jffsr.errors import InputError
 from jffsr.optimizers.registry import GENERATIONAL, OPTIMIZERS
 from jffsr.reading.did_you_mean import listed
+from jffsr.study.building import build_problem
 from jffsr.study.config import load_config
 from jffsr.study.run_folder import RunFolder
 
@@ -158,8 +159,6 @@ REPLACED = {
     ("30", "0"): f"x.yaml:6: task.duration: found 0, {DURATION}",
     ("30", "{min: 3}"): "x.yaml:6: task.duration.max: missing, this key is required",
     ("30", "{min: 3, max: 2}"): "x.yaml:6: task.duration: min is 3 and max is 2, min < max is expected",
-    ("[45, 3]", "[45]"): "x.yaml:5: task.goal_deg: found a list of 1, "
-    "and of 2 in 'start_deg'; in both one number for each joint of the robot is expected",
     ("[45, 3]", "[45, x]"): "x.yaml:5: task.goal_deg.1: found 'x', a number is expected",
     (
         "[45, 3]",
@@ -351,3 +350,18 @@ def test_a_value_that_is_cut_short_is_known():
     write("x.yaml", GOOD)
     with pytest.raises(InputError, match="did you mean 'polynomial'"):
         load_config("x.yaml", ["trajectory.kind=poly"])
+
+
+@pytest.mark.parametrize(("key", "wrong"), [("start_deg", "[90, 30, 0]"), ("goal_deg", "[-60]")])
+def test_the_end_whose_length_is_not_the_robots_is_named(key, wrong):
+    ends = {"start_deg": "[90, 30]", "goal_deg": "[-60, 90]", key: wrong}
+    task = "".join(f"  {name}: {value}\n" for name, value in ends.items())
+    limits = "limits: {position_deg: 324}\n"
+    config = load(f"kind: planning\nrobot: hu_2011_planar2\ntask:\n{task}  duration: 20\n{limits}")
+    with pytest.raises(InputError) as caught:
+        build_problem(config)
+    count = wrong.count(",") + 1
+    line = 4 + list(ends).index(key)
+    assert str(caught.value) == (
+        f"x.yaml:{line}: task.{key}: found a list of {count}, robot 'hu_2011_planar2' has 2 joints (joint1, joint2)"
+    )

@@ -35,7 +35,7 @@ STUDIES = {
 }
 # These robots have every form that a file can take; each further one would have to be compiled anew.
 ROBOTS = [DATA / f"{name}.yaml" for name in sorted(STUDIES)]
-SHARES = 10
+SHARES = 20
 SECONDS = 5.0
 
 

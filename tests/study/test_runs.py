@@ -20,6 +20,7 @@ from jffsr import cli
 from jffsr.study import planning, searching
 from jffsr.study.dataset import open_dataset
 from jffsr.study.summary import summary_text
+from jffsr.viz.showing import write_page, write_report
 
 CONFIG = "configs/planning/composite_wu6.yaml"
 
@@ -72,17 +73,9 @@ def test_folder_holds_what_is_promised(finished):
     assert lines[-1]["best_value"] == summary["cost"]
 
 
-def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
-    before = sorted(path.name for path in finished.iterdir())
-    pages = [tmp_path / "replay.html", tmp_path / "report.html"]
-    told = ["--html", str(pages[0]), "--report", str(pages[1])]
-    assert cli.main(["show", str(finished), str(finished), *told[:2]]) == cli.MET
-    assert cli.main(["show", str(finished), *told[2:]]) == cli.MET
-    capsys.readouterr()
-    # Two runs have a report each, so that one name for both is refused.
-    assert cli.main(["show", str(finished), str(finished), *told[2:]]) == cli.BAD_INPUT
-    assert "each of several runs has a report of its own" in capsys.readouterr().err
-    replay, report = (page.read_text(encoding="utf-8") for page in pages)
+def test_a_run_is_shared_in_one_file(finished, tmp_path):
+    replay = write_page([finished, finished], tmp_path / "replay.html").read_text(encoding="utf-8")
+    report = write_report(finished, (), tmp_path / "report.html").read_text(encoding="utf-8")
     summary = json.loads((finished / "summary.json").read_text())
     assert html.escape(summary["result"]["sentence"]) in report
     assert f"folder {finished.name}" in report
@@ -90,11 +83,28 @@ def test_a_run_is_shared_in_one_file(finished, tmp_path, capsys):
     assert "Whether bodies touch was not looked at" in report
     for term in summary["terms"]:
         assert term.replace("_", " ") in report
-    assert report.count("data:image/png;base64,") == len(list((finished / "figures").glob("*.png")))
     assert replay.count('class="plots"') == 2
     assert max(map(len, (replay, report))) < 3e6
+
+
+@pytest.mark.slow
+def test_show_writes_figures_and_pages(finished, tmp_path, capsys):
+    before = sorted(path.name for path in finished.iterdir())
+    pages = [tmp_path / "replay.html", tmp_path / "report.html"]
+    told = ["--html", str(pages[0]), "--report", str(pages[1])]
+    assert cli.main(["show", str(finished), str(finished), *told[:2]]) == cli.MET
+    assert cli.main(["show", str(finished), *told[2:]]) == cli.MET
+    report = pages[1].read_text(encoding="utf-8")
+    assert report.count("data:image/png;base64,") == len(list((finished / "figures").glob("*.png")))
     shutil.rmtree(finished / "figures")
     assert sorted(path.name for path in finished.iterdir()) == before
+    capsys.readouterr()
+
+
+def test_two_runs_have_a_report_each_so_that_one_name_for_both_is_refused(finished, tmp_path, capsys):
+    told = ["show", str(finished), str(finished), "--report", str(tmp_path / "report.html")]
+    assert cli.main(told) == cli.BAD_INPUT
+    assert "each of several runs has a report of its own" in capsys.readouterr().err
 
 
 def test_the_summary_tells_how_far_the_base_turns(finished):

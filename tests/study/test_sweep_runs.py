@@ -267,6 +267,7 @@ def test_a_call_that_fails_takes_no_other_with_it(base, finished, tmp_path, monk
     assert (folder / "sweep.nc").read_bytes() == (finished / "sweep.nc").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_report_shows_the_best_motions(finished, tmp_path, capsys):
     file = tmp_path / "shared" / "sweep.html"
     assert cli.main(["show", str(finished), "--report", str(file), "--no-serve"]) == cli.MET

@@ -123,7 +123,7 @@ def with_poses(start: str, goal: str = GOAL, order: str = "-xyz") -> list[str]:
             ["tracker.position_gain=9"],
             "tracker.position_gain is 9 1/s, which is unstable with rates held over",
         ),
-        (["task.start_deg=[0, 0]"], "task.start_deg: found 2 numbers, robot 'wu_2018_6dof' has 6 joints"),
+        (["task.start_deg=[0, 0]"], "task.start_deg: found a list of 2, robot 'wu_2018_6dof' has 6 joints"),
         (["limits.position_deg=100"], "lies outside its range"),
         (
             ["timing={kind: fastest, duration: null, ramp_fraction: null}", "task.linear_momentum=[1, 0, 0]"],

@@ -195,6 +195,7 @@ def test_least_largest_error_of_a_turn_that_is_too_fast(robots):
     assert found.worst[-1] == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_away_from_singularities_nothing_is_left_at_the_samples(wu):
     start = wu_path.state_at(wu_path.START)
     whole = wu_path.wu_path(wu, 25.0)
@@ -208,6 +209,7 @@ def test_away_from_singularities_nothing_is_left_at_the_samples(wu):
     assert np.max(np.abs(found.tracked.pose_error)) < 1e-9
 
 
+@pytest.mark.slow
 def test_errors_between_samples_are_those_of_more_samples(wu, path, tracked):
     time, errors = jit(lambda t, p: errors_between(wu, p, t, num_steps=2))(tracked, path)
     twice = jit(lambda p, r: track_rates(wu, p, wu_path.state_at(NEAR), r, DURATION, MOMENTUM))(

@@ -244,6 +244,7 @@ def test_spline_through_poses_meets_them_and_interpolates_as_scipy():
     np.testing.assert_allclose(along(path, s)[0], peer(s), rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_spline_through_poses_is_differentiable_by_them():
     positions = np.array([p for p, _ in POSES])
     quaternions = Rotation.from_euler("xyz", [a for _, a in POSES]).as_quat(scalar_first=True)
