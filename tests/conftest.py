@@ -29,8 +29,11 @@ from motions import robot_from_record  # noqa: E402
 from jffsr.robots.loading import list_robots, load_robot  # noqa: E402
 from jffsr.robots.robot import Robot  # noqa: E402
 
-# Bytes of memory above which a worker lets go of compiled programs before the next file.
-KEPT_MEMORY = 4e9
+# Bytes of memory above which a worker lets go of compiled programs before the next file: freeing them, and compiling
+# again what the next files share, takes seconds.
+WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+MEMORY = float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
+KEPT_MEMORY = min(max(0.5 * MEMORY / WORKERS, 3e9), 8e9)
 
 DATA = Path(__file__).parent / "data"
 

@@ -30,9 +30,7 @@ def reference(robot, state, q, momentum):
     return jit(jax.vmap(one))(q)
 
 
-@pytest.fixture(
-    scope="module", params=[pytest.param(0.0, marks=pytest.mark.slow), 1.0], ids=["at rest", "with momentum"]
-)
+@pytest.fixture(scope="module", params=[0.0, 1.0], ids=["at rest", "with momentum"])
 def confirmed(request, robots):
     """The seven-axis servicer, poses in I that it can reach, and what was found for them."""
     robot = robots["servicer_7dof"]
@@ -54,6 +52,7 @@ def confirmed(request, robots):
     return robot, state, momentum, position, found
 
 
+@pytest.mark.slow
 def test_the_tool_is_there_when_the_motion_ends(confirmed):
     robot, state, momentum, position, found = confirmed
     assert bool(np.all(found.best().success))
@@ -66,6 +65,7 @@ def test_the_tool_is_there_when_the_motion_ends(confirmed):
     assert away[np.asarray(found.success)].max() < 3e-6
 
 
+@pytest.mark.slow
 def test_the_base_has_moved(confirmed):
     # A still base would miss by far more than the tolerance, so that the test above says something.
     _, state, _, _, found = confirmed

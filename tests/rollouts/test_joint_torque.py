@@ -95,7 +95,8 @@ def test_open_loop_they_drive_the_robot_along_the_motion(robot, motions, mode):
         np.testing.assert_allclose(getattr(driven, name), getattr(planned, name)[::2], rtol=0, atol=3e-7)
 
 
-@pytest.mark.parametrize("kinds", ["as they are", pytest.param("all slide", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("kinds", ["as they are", "all slide"])
 def test_the_textbooks_inverse_dynamics_gives_the_same(robot, motions, kinds):
     """On a tree whose joints turn, slide, and do both in one unbranched part."""
     motion = motions(FLOATING)

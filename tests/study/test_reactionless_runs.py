@@ -127,7 +127,7 @@ def test_shipped_configuration_reads_back_as_it_is(tmp_path):
         ("strike={time: 0.1, rebound_deg: 20}", "strike.rebound_deg: found 20, less than"),
         ("runs={a: {estimater: plain}}", "estimater.*estimator"),
         ("hold.excitation.slowest=1", "hold.excitation.slowest: found 1 Hz, less than"),
-        ("robot=hu_2011_planar2", "found 3 numbers.*2 joints"),
+        ("robot=hu_2011_planar2", "found a list of 3.*2 joints"),
     ],
 )
 def test_bad_input_is_told_in_one_sentence(config, override, sentence, tmp_path, capsys):
