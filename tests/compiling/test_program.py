@@ -110,6 +110,8 @@ def test_traced_arguments_and_other_settings_are_left_to_jax():
         Program(lambda x: x / x)(np.float64(0.0))
 
 
+# What all other tests have compiled would go as well.
+@pytest.mark.slow
 def test_what_is_forgotten_is_compiled_anew():
     traces = []
     program = Program(lambda x: traces.append(None) or 2 * x)
