@@ -82,7 +82,9 @@ def test_the_best_setting_is_the_one_most_of_whose_runs_are_met():
 def test_a_sweep_without_a_value_has_no_best_setting():
     dataset = merged_sweep()
     dataset["cost"].values[:] = np.nan
-    assert "No point" in best_setting(dataset)
+    assert "No point of this sweep has a value of J." in best_setting(dataset)
+    dataset["missed_clearance"] = ("point", np.ones(6))
+    assert "in none did the search find a motion that keeps every constraint." in best_setting(dataset)
 
 
 def test_every_setting_says_what_binds_in_its_best_run():

@@ -77,6 +77,8 @@ def test_infinite_and_missing_runs_are_told_apart(dataset):
     line = markdown(changed, ()).splitlines()[2].split(" | ")
     assert line[3:5] == ["5", "0"]
     assert line[9] == "inf"
+    assert "infinite where the search found no motion" in markdown(changed, ())
+    assert "infinite" not in markdown(dataset, ())
     assert np.isfinite(float(line[7]))
 
 

@@ -70,9 +70,15 @@ def markdown(dataset: Any, comparisons: Sequence[Comparison], most: int | None =
         lines.append(_line([*cells, str(row.points.size), str(met), *map(_number, quartiles), *counts]))
     if len(shown) < len(rows):
         lines += ["", f"{len(rows) - len(shown)} more settings are in table.md."]
+    lost = any(np.any(np.isinf(row.cost)) for row in rows)
     lines += [
         "",
-        "Evaluations and gradients are medians. J is the published index at the planner's own step.",
+        "Evaluations and gradients are medians. J is the published index at the planner's own step"
+        + (
+            ", infinite where the search found no motion, or none that keeps every constraint."
+            if lost
+            else "."
+        ),
     ]
     for comparison in comparisons:
         lines += ["", comparison.to_markdown()]

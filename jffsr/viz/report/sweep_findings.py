@@ -13,7 +13,7 @@ from jffsr.study.sweep.best import best_point, find_best, unit_of
 from jffsr.study.sweep.compute import OVERRUN
 from jffsr.study.sweep.ended import failures_of
 from jffsr.study.sweep.merging import MISSING
-from jffsr.study.sweep.misses import missed_in_words
+from jffsr.study.sweep.misses import MISSED, missed_in_words
 from jffsr.study.sweep.significance import ranked_cost
 from jffsr.study.sweep.table import keys_of, rows_of
 from jffsr.viz.report.tables import number, table
@@ -41,7 +41,9 @@ def best_setting(dataset: Dataset) -> str:
     """The best setting in a sentence, and what makes it the best."""
     best = find_best(dataset)
     if best is None:
-        return "<p>No point of this sweep has a value of J.</p>"
+        constrained = any(str(name).startswith(MISSED) for name in dataset.data_vars)
+        why = ": in none did the search find a motion that keeps every constraint" if constrained else ""
+        return f"<p>No point of this sweep has a value of J{why}.</p>"
     return (
         f'<p class="verdict {"met" if best.met else "missed"}">Best setting: {escape(best.sentence)}.</p>'
         "<p>That is the setting most of whose runs met their accuracy, and among equals the one with the least "
