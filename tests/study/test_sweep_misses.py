@@ -76,7 +76,7 @@ def test_the_constraint_missed_most_comes_first():
         [problem(JointLimits(tolerance=1e-3), FinalAttitude(LEVEL, tolerance=1e-5))],
         {"joint_limits": np.array([0.5]), "final_attitude": np.array([0.1])},
     )
-    dataset = xarray.Dataset(merged_misses(1, [Part((0,), results)]))
+    dataset = xarray.Dataset(merged_misses(1, [((0,), results)]))
     assert [words.split(" missed")[0] for words in missed_in_words(dataset, 0)] == [
         "final attitude",
         "joint limits",

@@ -77,7 +77,7 @@ def merged(
             if quantity in part.results:
                 values[list(part.numbers)] = part.results[quantity]
         variables[quantity] = ("point", values, {"units": unit, "long_name": meaning})
-    variables |= merged_misses(count, parts)
+    variables |= merged_misses(count, ((part.numbers, part.results) for part in parts))
     variables["free_numbers"] = (
         ("point", "free"),
         _padded(count, parts, "free_numbers"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,8 +12,6 @@ from jffsr.planning.problem import Problem
 
 if TYPE_CHECKING:
     from xarray import Dataset
-
-    from jffsr.study.sweep.parts import Part
 
 MISSED, ALLOWED = "missed_", "allowed_"
 """What the names of the merged file's variables begin with."""
@@ -35,13 +33,18 @@ def misses_of(problems: Sequence[Problem], violations: Mapping[str, Any]) -> dic
     }
 
 
-def merged_misses(count: int, parts: Sequence[Part]) -> dict[str, Any]:
-    """Two variables over the points for each constraint that any of them has; NaN where a point does not have it."""
+def merged_misses(
+    count: int, found: Iterable[tuple[Sequence[int], Mapping[str, np.ndarray]]]
+) -> dict[str, Any]:
+    """Two variables over the points for each constraint that any of them has; NaN where a point does not have it.
+
+    found: the numbers of points, and what `misses_of` gave for them, among other results.
+    """
     variables: dict[str, Any] = {}
-    for part in parts:
+    for numbers, results in found:
         # Parts that an earlier version wrote do not tell.
-        for column, name in enumerate(part.results.get("constraints", ())):
-            unit = str(part.results["constraint_units"][column]) or "1"
+        for column, name in enumerate(results.get("constraints", ())):
+            unit = str(results["constraint_units"][column]) or "1"
             for prefix, key, meaning in (
                 (MISSED, "constraint_missed", "misses in the finer re-run"),
                 (ALLOWED, "constraint_allowed", "may miss"),
@@ -51,7 +54,7 @@ def merged_misses(count: int, parts: Sequence[Part]) -> dict[str, Any]:
                     "long_name": f"by how much a point {meaning} the constraint {name}",
                 }
                 kept = variables.setdefault(f"{prefix}{name}", ("point", np.full(count, np.nan), attributes))
-                kept[1][list(part.numbers)] = part.results[key][:, column]
+                kept[1][list(numbers)] = results[key][:, column]
     return variables
 
 
