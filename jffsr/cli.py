@@ -85,6 +85,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
     spec = read_sweep(arguments.config, arguments.overrides)
     _prepare_jax()
     _use_all_devices(arguments)
+    from jffsr.study.sweep.ended import outcome_lines
     from jffsr.study.sweep.running import run_sweep
 
     given = {name: getattr(arguments, name, None) for name in ("together", "workers", "scheduler")}
@@ -102,9 +103,7 @@ def _sweep(arguments: argparse.Namespace) -> int:
         from jffsr.viz.sweep import draw_sweep
 
         draw_sweep(path, ["png"])
-    best = sweep.summary.get("best_setting")
-    told = f"\n  best    {best}" if best else ""
-    print(f"\n{sweep.table}\n{spec.name}: {sweep.summary['result']['sentence']}{told}\n  folder  {path}")
+    print("\n".join(["", sweep.table, *outcome_lines(sweep.summary), f"  folder  {path}"]))
     if sweep.failures:
         print(f"jffsr: {sweep.failures[0]}; the same command tries again", file=sys.stderr)
         return DEFECT
@@ -210,6 +209,10 @@ def _show(arguments: argparse.Namespace) -> int:
     terminal = sys.stdin.isatty() and sys.stdout.isatty() and not written and showing.can_serve()
     if arguments.serve or (terminal and not arguments.no_serve):
         showing.serve_replays(folders, arguments.port, not arguments.no_browser)
+    elif not written and not arguments.no_serve:
+        print(
+            "  replay        not opened, for there is no terminal; --serve opens it, --html and --report write pages"
+        )
     return MET
 
 
@@ -221,8 +224,10 @@ def _print_one(folder: Path) -> list[Path]:
     summary = showing.read_summary(folder)
     files = showing.draw(folder)
     if showing.is_sweep(folder):
+        from jffsr.study.sweep.ended import outcome_lines
+
         print((folder / "table.md").read_text(encoding="utf-8"))
-        print(f"{summary['name']}: {summary['result']['sentence']}")
+        print("\n".join(outcome_lines(summary)))
         for failure in summary.get("failures", ()):
             print(f"  failed        {failure}")
     else:

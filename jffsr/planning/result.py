@@ -11,6 +11,7 @@ import numpy as np
 
 from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.constraints import in_units, tolerance_of
+from jffsr.objectives.torque_terms import JointTorque, TorqueLimit
 from jffsr.planning.problem import Problem
 from jffsr.planning.verification import Overruns, Verification
 from jffsr.rollouts.motion import Motion
@@ -108,16 +109,21 @@ def explain(
         index = f"J over {len(problem.uncertainty.robots.mass)} robots"
     broken = list(violations(problem, verification.overruns, tolerances))
     missed = ", ".join(constraints_missed(problem, verification, motion))
-    also = f"; limits violated: {', '.join(broken)}" if broken else "; every limit is kept"
+    limits = "every limit but those of torque" if torque_unseen(problem) else "every limit"
+    also = f"; limits violated: {', '.join(broken)}" if broken else f"; {limits} is kept"
     binding = _binding(verification)
     if code is ResultCode.ACCURACY_MET:
-        kept = "every limit and constraint is" if problem.constraints else "every limit is"
+        kept = f"{limits}, and every constraint, is" if problem.constraints else f"{limits} is"
         text = f"accuracy met: {index} = {cost:.4g} <= {accuracy:g}, and {kept} kept on the finer grid"
     elif code is ResultCode.CONSTRAINTS_VIOLATED:
-        text = (
-            f"constraints violated on the finer grid: {missed}; {index} = {cost:.4g}; allow more time or more free "
-            f"numbers, raise the budget of the gradients, or rollout.num_steps where the search had kept them"
-        )
+        if motion is not None and _kept_between(problem, verification, motion):
+            advice = "the search had kept them at its own steps, so raise rollout.num_steps"
+        else:
+            advice = (
+                "allow more time or more free numbers of the trajectory, raise the budget of the gradients, or "
+                "rollout.num_steps where the search had kept them"
+            )
+        text = f"constraints violated on the finer grid: {missed}; {index} = {cost:.4g}; {advice}"
     elif code is ResultCode.LIMITS_VIOLATED:
         text = (
             f"{index} = {cost:.4g} <= {accuracy:g}, but limits are violated: {', '.join(broken)}; lower the scale of "
@@ -175,6 +181,25 @@ def constraints_missed(
             (missed, unit), (allowed, _) = (in_units(constraint, amount) for amount in (missed, allowed))
             unit = f" {unit}" if unit else ""
             yield f"{constraint.name} by {missed:.3g}{unit} (allowed {allowed:.3g}{unit}{where})"
+
+
+def torque_unseen(problem: Problem) -> bool:
+    """Whether the robot has limits of torque that no term and no constraint of the problem holds a motion to."""
+    looked_at = (*problem.objective.terms, *problem.constraints)
+    limited = bool(np.any(np.isfinite(problem.robot.limits.torque)))
+    return limited and not any(isinstance(one, JointTorque | TorqueLimit) for one in looked_at)
+
+
+def _kept_between(problem: Problem, verification: Verification, motion: Motion) -> bool:
+    """Whether all that the finer run misses are clearances that are kept at the motion's own samples."""
+    missed = [
+        one for one in problem.constraints if not verification.violations[one.name] <= tolerance_of(one)
+    ]
+    return all(
+        isinstance(one, Clearance)
+        and one.nearest(problem.robot, motion).distance >= one.margin - in_units(one, tolerance_of(one))[0]
+        for one in missed
+    )
 
 
 def violations(problem: Problem, overruns: Overruns, tolerances: Tolerances) -> Iterator[str]:

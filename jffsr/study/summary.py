@@ -13,13 +13,14 @@ from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.constraints import Constraint, in_units, tolerance_of
 from jffsr.objectives.terms import attitude_angles
 from jffsr.planning.plan import Plan
-from jffsr.planning.result import LIMIT_KINDS, violations
+from jffsr.planning.result import LIMIT_KINDS, torque_unseen, violations
 from jffsr.rollouts.motion import Motion
 from jffsr.study.dataset import excursion_limit
 from jffsr.study.robust_summary import robust_lines
 from jffsr.study.sensitivity_summary import sensitivity_lines, sensitivity_summary
 
 NOT_LOOKED_AT = "whether bodies touch was not looked at; the key constraints.clearance asks for it"
+TORQUE_UNSEEN = "the limits of torque were not looked at; objective.joint_torque.enabled: true asks for it"
 _PACKAGES = ("jffsr", "jax", "jaxlib", "numpy", "optax", "mujoco", "mujoco-mjx")
 
 
@@ -51,6 +52,7 @@ def plan_summary(plan: Plan, name: str, seed: int, tolerances) -> dict[str, Any]
             {"bodies": found.pair, "distance_m": found.distance, "time_s": found.time, "sentence": str(found)}
             for found in clearance
         ],
+        "torque_limits_looked_at": not torque_unseen(problem),
         "duration": float(np.asarray(plan.trajectory.duration)),
         "evaluations": {"objective": plan.evaluations, "gradient": plan.gradient_evaluations},
         "evaluations_to_accuracy": None
@@ -170,8 +172,10 @@ def _motion_lines(summary: dict[str, Any]) -> list[str]:
         )
     near = summary.get("nearest_approach")
     if near is not None:
-        told = [found["sentence"] for found in near] or [NOT_LOOKED_AT]
+        told = [f"{found['sentence']}, at the planner's steps" for found in near] or [NOT_LOOKED_AT]
         lines += [f"  clearance     {sentence}" for sentence in told]
+    if summary.get("torque_limits_looked_at") is False:
+        lines.append(f"  torque        {TORQUE_UNSEEN}")
     return lines
 
 

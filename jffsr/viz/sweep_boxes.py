@@ -57,6 +57,7 @@ def draw_boxes(dataset: Dataset) -> Figure | None:
     if any(np.any(row.cost <= floor) for row in rows):
         axes.set_xlim(left=0.7 * floor)
     axes.set_xlabel("J [-]")
+    axes.margins(x=0.08)
     _mark_accuracy(axes, float(dataset.attrs["accuracy"]))
     handles = [
         Patch(facecolor=level_look(i)["color"], alpha=0.35) for i in range(len(levels) if coloured else 0)
@@ -65,6 +66,9 @@ def draw_boxes(dataset: Dataset) -> Figure | None:
     if dataset.attrs["accuracy"] > 0:
         handles.append(Line2D([], [], color=GREY, linestyle=(0, (4, 2)), linewidth=0.8))
         names.append(f"accuracy: J = {dataset.attrs['accuracy']:g}")
+    if any(np.any(row.cost <= floor) for row in rows):
+        handles.append(Line2D([], [], marker="<", markersize=3, color=GREY, linestyle=""))
+        names.append(f"J below {floor:.3g}")
     if handles:
         legend_above(figure, handles, names)
     return figure
@@ -91,6 +95,11 @@ def _box(axes, place: float, row: Row, colour: str, floor: float) -> None:
     if not cost.size:
         axes.text(0.5, place, "no finite J", transform=axes.get_yaxis_transform(), va="center", color=GREY)
         return
+    if lost := row.cost.size - cost.size:
+        words = f"{lost} of {row.cost.size} without J"
+        axes.text(
+            1.01, place, words, transform=axes.get_yaxis_transform(), va="center", fontsize=5.5, color=GREY
+        )
     low, lower, middle, upper, high = np.quantile(cost, [0, 0.25, 0.5, 0.75, 1])
     axes.plot([low, high], [place, place], color=colour, linewidth=0.8, zorder=2)
     axes.barh(place, upper - lower, 0.62, left=lower, color=colour, alpha=0.35, linewidth=0, zorder=2)

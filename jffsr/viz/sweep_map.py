@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.colors import LogNorm
+from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.merging import MISSING
 from jffsr.study.sweep.significance import ranked_cost
 from jffsr.study.sweep.table import keys_of
-from jffsr.viz.style import new_figure, styled
+from jffsr.viz.style import legend_above, new_figure, styled
 from jffsr.viz.sweep_boxes import OPTIMIZER, lowest
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_LEVELS = 25
 _MOST_PANELS = 6
+_LOST = ListedColormap(["0.85"])
 _WRITTEN = 10  # levels, up to which every cell has its number
 
 
@@ -28,7 +30,8 @@ def draw_map(dataset: Dataset) -> Figure | None:
     """Median J over the first two swept keys of at least two values, a panel for each optimizer.
 
     Each cell, where there is room, says the share of runs that met the accuracy. Medians are over everything else that
-    was swept; the colours end four decades under the accuracy. None where there are no two such keys.
+    was swept; the colours end four decades under the accuracy, and a cell is grey where half of its runs or more have
+    no J. None where there are no two such keys.
     """
     keys = [
         key for key in keys_of(dataset) if key != OPTIMIZER and 2 <= len(_levels(dataset, key)) <= MOST_LEVELS
@@ -48,7 +51,14 @@ def draw_map(dataset: Dataset) -> Figure | None:
     figure = new_figure(max(1.9, min(0.24 * len(rows) + 1.0, 4.0)), wide * len(panels) + 1.5)
     all_axes = figure.subplots(1, len(panels), squeeze=False, sharey=True)[0]
     for axes, panel, cells, share in zip(all_axes, panels, medians, met, strict=True):
-        image = axes.imshow(cells, origin="lower", aspect="auto", cmap="viridis_r", norm=norm)
+        image = axes.imshow(
+            np.where(np.isinf(cells), np.nan, cells),
+            origin="lower",
+            aspect="auto",
+            cmap="viridis_r",
+            norm=norm,
+        )
+        axes.imshow(np.where(np.isinf(cells), 0.0, np.nan), origin="lower", aspect="auto", cmap=_LOST)
         axes.spines[:].set_visible(False)
         axes.set_xticks(range(len(columns)), [_text(value) for value in columns])
         axes.set_yticks(range(len(rows)), [_text(value) for value in rows])
@@ -60,6 +70,8 @@ def draw_map(dataset: Dataset) -> Figure | None:
         if len(columns) <= _WRITTEN:
             _write_shares(axes, cells, share, norm)
     all_axes[0].set_ylabel(up)
+    if any(np.any(np.isinf(cells)) for cells in medians):
+        legend_above(figure, [Patch(facecolor="0.85")], ["no J in half of the runs or more"])
     figure.colorbar(
         image, ax=all_axes, label="median J [-]", extend="min" if known.min() < floor else "neither"
     )
@@ -92,8 +104,8 @@ def _cells(dataset, across, up, columns, rows, panel) -> tuple[np.ndarray, np.nd
 
 def _write_shares(axes, cells: np.ndarray, share: np.ndarray, norm: LogNorm) -> None:
     for (i, j), part in np.ndenumerate(share):
-        if np.isfinite(part) and np.isfinite(cells[i, j]):
-            dark = norm(cells[i, j]) > 0.5
+        if np.isfinite(part):
+            dark = np.isfinite(cells[i, j]) and norm(cells[i, j]) > 0.5
             axes.text(
                 j,
                 i,

@@ -15,7 +15,8 @@ from jffsr.clearance.along_motion import clearances
 from jffsr.clearance.model import ClearanceModel
 from jffsr.objectives.clearance import Clearance
 from jffsr.objectives.composite import TermValue
-from jffsr.planning.result import ResultCode, Tolerances, explain, result_code
+from jffsr.objectives.torque_terms import JointTorque, TorqueLimit
+from jffsr.planning.result import ResultCode, Tolerances, explain, result_code, torque_unseen
 from jffsr.planning.verification import Overruns, Verification
 
 TOLERANCES = Tolerances()
@@ -64,6 +65,21 @@ def test_accuracy_not_met_names_the_binding_term(problem):
     assert not result.success
     assert "J = 20 > 1, bound by joint_rate (18 of J)" in result.sentence
     assert "every limit is kept" in result.sentence
+
+
+def test_limits_of_torque_that_nobody_looked_at_are_not_said_to_be_kept(problem):
+    robot = problem.robot.replace(limits=replace(problem.robot.limits, torque=np.full(6, 0.05)))
+    bare = replace(problem, robot=robot)
+    for checked in (verification(), verification(cost=20.0)):
+        assert "every limit but those of torque is kept" in judged(bare, checked).sentence
+    constraint = TorqueLimit(robot.limits.torque)
+    held = replace(bare, constraints=(constraint,))
+    kept = judged(held, verification(violations={constraint.name: np.array(0.0)})).sentence
+    assert "every limit, and every constraint, is kept" in kept
+    term = JointTorque(np.array(0.01), robot.limits.torque)
+    objective = replace(problem.objective, terms=(*problem.objective.terms, term))
+    assert torque_unseen(bare)
+    assert not torque_unseen(replace(bare, objective=objective))
 
 
 def test_not_converged_asks_for_a_larger_budget(problem):
@@ -137,6 +153,11 @@ def test_bodies_that_come_too_near_are_named_with_the_time(robots, problem):
     names = " and ".join(model.pair_names[np.argmin(clearances(model, robot, motion)[:, 3])])
     assert f"clearance by 0.03 m (allowed 0.0001 m; at the planner's step {names} " in found
     assert "at 6 s, the margin is 0.05 m" in found
+    # They are too near at the search's own samples, too: more steps alone would not help.
+    assert "allow more time" in found
+    lenient = replace(held, constraints=(replace(constraint, margin=np.array(-10.0)),))
+    kept = explain(ResultCode.CONSTRAINTS_VIOLATED, lenient, checked, TOLERANCES, motion).sentence
+    assert kept.endswith("the search had kept them at its own steps, so raise rollout.num_steps")
     plain = explain(ResultCode.CONSTRAINTS_VIOLATED, held, checked, TOLERANCES).sentence
     assert "clearance by 0.03 m (allowed 0.0001 m)" in plain
 

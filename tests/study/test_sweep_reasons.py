@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import open_dataset
 from jffsr.study.sweep.merging import FAILURE, merged, save_sweep
 from jffsr.study.sweep.parts import Part
@@ -35,6 +36,16 @@ def test_reasons_are_kept_with_the_points_that_they_stopped(tmp_path):
     dataset = open_dataset(tmp_path / "sweep.nc")
     assert dataset[FAILURE].values.tolist() == ["", "MemoryError: no room", ""]
     np.testing.assert_array_equal(dataset["code"].values, [0, -1, 1])
+
+
+def test_codes_have_their_meanings(tmp_path):
+    save_sweep(made(), tmp_path / "sweep.nc")
+    code = open_dataset(tmp_path / "sweep.nc")["code"].attrs
+    meanings = dict(zip(code["flag_values"].tolist(), code["flag_meanings"].split(), strict=True))
+    assert meanings[-1] == "not_computed"
+    assert {kind.name.lower(): int(kind) for kind in ResultCode} == {
+        name: value for value, name in meanings.items() if value >= 0
+    }
 
 
 def test_a_whole_sweep_holds_no_reasons_and_its_own_name():

@@ -46,8 +46,8 @@ def test_joints_have_rows_of_their_own_in_their_own_units(two_arms):
     assert columns[""] == ["turns" if turns else "slides" for turns in turning]
     expected = [f"{180 / np.pi * 0.5:.4g}" if turns else "0.5" for turns in turning]
     assert columns["start [deg or m]"] == expected
-    assert columns["to [deg or m]"][0] == "none"
-    assert columns["from [deg or m]"][0] == f"{-180 / np.pi:.4g}"
+    assert columns["upper limit [deg or m]"][0] == "none"
+    assert columns["lower limit [deg or m]"][0] == f"{-180 / np.pi:.4g}"
     # None of them has another limit.
     assert not any("rate" in head or "acceleration" in head or "torque" in head for head in columns)
 

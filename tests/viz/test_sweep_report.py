@@ -193,6 +193,8 @@ def test_a_sweep_with_lost_points_can_be_shown(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "3 of 6 points met their accuracy; 1 could not be computed" in said
     assert "failed        point 4: MemoryError: no room" in said
+    assert "best    task.duration = 40 s" in said
+    assert "short   1 accuracy not met, 1 limits violated; jffsr show with --report says why" in said
 
 
 def test_a_sweep_under_way_is_refused(tmp_path):

@@ -13,7 +13,7 @@ from jffsr import cli
 from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.significance import compare, holm
-from jffsr.study.sweep.table import keys_of, markdown, rows_of
+from jffsr.study.sweep.table import keys_of, markdown, quantile, rows_of
 from jffsr.viz.style import level_look
 from jffsr.viz.sweep_boxes import draw_boxes
 from jffsr.viz.sweep_convergence import _held, draw_sweep_convergence
@@ -182,6 +182,30 @@ def test_convergence_of_settings_in_which_nothing_was_found(dataset, tmp_path):
     assert len(figure.axes[0].lines) == 1  # the accuracy
     changed["history_best_value"].values[:] = np.inf
     assert draw_sweep_convergence(changed) is None
+
+
+def test_a_setting_whose_median_run_is_lost_is_grey_and_has_its_share(dataset, tmp_path):
+    changed = dataset.copy(deep=True)
+    here = (changed["optimizer.kind"].values == "qpso") & (changed["task.duration"].values == 15)
+    here &= changed["limits.base_excursion_deg"].values == 5
+    # Three of six: the median lies between the largest that is left and an infinite one.
+    changed["cost"].values[np.flatnonzero(here)[:3]] = np.inf
+    figure = draw_map(changed)
+    figure.savefig(tmp_path / "map.png")
+    values, lost = (image.get_array() for image in figure.axes[0].images)
+    assert np.ma.is_masked(values[0, 0])
+    assert [bool(cell) for cell in ~np.ma.getmaskarray(lost).ravel()] == [True] + [False] * 5
+    assert len(figure.axes[0].texts) == 6
+    assert figure.legends[0].get_texts()[0].get_text() == "no J in half of the runs or more"
+    row = next(row for row in rows_of(changed) if row.values["task.duration"] == 15)
+    assert quantile(row.cost, 0.5) == np.inf
+    assert np.isfinite(quantile(row.cost, 0.25))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.25, 0.5, 1.0])
+def test_quantiles_of_finite_numbers_are_numpys(share):
+    values = np.random.default_rng(2).normal(size=7)
+    assert quantile(values, share) == pytest.approx(np.quantile(values, share), abs=1e-14)
 
 
 def test_show_draws_a_sweep(dataset, tmp_path, capsys):

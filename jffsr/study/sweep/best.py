@@ -9,7 +9,7 @@ import numpy as np
 
 from jffsr.planning.result import ResultCode
 from jffsr.study.sweep.points import value_text
-from jffsr.study.sweep.table import Row, rows_of
+from jffsr.study.sweep.table import Row, quantile, rows_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -26,11 +26,15 @@ class Best:
 
 
 def find_best(dataset: Dataset) -> Best | None:
-    """The setting most of whose runs met their accuracy, among equals that with the least median J; None without J."""
+    """The setting most of whose runs met their accuracy; None without J.
+
+    Among equals it is the one with the least median J, then with the least J; a run that broke a constraint has an
+    infinite one.
+    """
     rows = [row for row in rows_of(dataset) if np.any(np.isfinite(row.cost))]
     if not rows:
         return None
-    best = min(rows, key=lambda row: (-np.mean(row.code == ResultCode.ACCURACY_MET), _median(row.cost)))
+    best = min(rows, key=lambda row: _merit(row))
     met, count = int(np.count_nonzero(best.code == ResultCode.ACCURACY_MET)), best.points.size
     cost = float(dataset["cost"].values[best_point(best)])
     accuracy = float(dataset.attrs.get("accuracy", np.nan))
@@ -38,10 +42,16 @@ def find_best(dataset: Dataset) -> Best | None:
     if count == 1:
         found = f"J {cost:.4g}, accuracy{asked} {'met' if met else 'not met'}"
     else:
-        values = f"J at best {cost:.4g}, median {_median(best.cost):.4g}"
+        values = f"J at best {cost:.4g}, median {quantile(best.cost, 0.5):.4g}"
         found = f"accuracy{asked} met by {met} of its {count} runs, {values}"
     whole = sum(bool(np.all(row.code == ResultCode.ACCURACY_MET)) for row in rows)
     return Best(f"{_values(best, dataset)}: {found}", met > 0, len(rows), whole)
+
+
+def _merit(row: Row) -> tuple[float, float, float]:
+    """What is smaller for the better setting."""
+    met = float(np.mean(row.code == ResultCode.ACCURACY_MET))
+    return -met, quantile(row.cost, 0.5), float(np.min(row.cost))
 
 
 def best_point(row: Row) -> int:
@@ -49,10 +59,6 @@ def best_point(row: Row) -> int:
     met = row.code == ResultCode.ACCURACY_MET
     cost = np.where(met, row.cost, np.inf) if met.any() else row.cost
     return int(row.points[np.argmin(np.where(np.isnan(cost), np.inf, cost))])
-
-
-def _median(cost: np.ndarray) -> float:
-    return float(np.quantile(cost, 0.5, method="linear" if np.all(np.isfinite(cost)) else "nearest"))
 
 
 def _values(row: Row, dataset: Dataset) -> str:

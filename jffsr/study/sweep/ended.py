@@ -38,6 +38,11 @@ def summary_of(dataset: Any, name: str) -> dict[str, Any]:
         "computed": int(code.size - len(failed)),
         "met": met,
         "best_setting": None if best is None else best.sentence,
+        "fell_short": {
+            kind.name.lower(): count
+            for kind in ResultCode
+            if kind is not ResultCode.ACCURACY_MET and (count := int(np.count_nonzero(code == kind)))
+        },
         "failures": _grouped(failed),
         "evaluations": {
             "objective": int(dataset["evaluations"].values.sum()),
@@ -45,6 +50,17 @@ def summary_of(dataset: Any, name: str) -> dict[str, Any]:
         },
         "versions": versions(),
     }
+
+
+def outcome_lines(summary: Mapping[str, Any]) -> list[str]:
+    """What is printed under a sweep's table: how many points met, the best setting, the codes of the others."""
+    lines = [f"{summary['name']}: {summary['result']['sentence']}"]
+    if best := summary.get("best_setting"):
+        lines.append(f"  best    {best}")
+    if short := summary.get("fell_short"):
+        kinds = ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in short.items())
+        lines.append(f"  short   {kinds}; jffsr show with --report says why")
+    return lines
 
 
 def failures_of(dataset: Any) -> dict[int, str]:

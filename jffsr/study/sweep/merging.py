@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from jffsr.planning.result import ResultCode
 from jffsr.study.dataset import save_dataset
 from jffsr.study.sweep.compute import OVERRUN
 from jffsr.study.sweep.misses import merged_misses
@@ -21,7 +22,7 @@ FAILURE = "failure"
 """The variable that says why, empty for all other points; it is there only where some point could not be computed."""
 
 _UNITS = {
-    "code": ("1", "result code: 0 accuracy met, -1 not computed"),
+    "code": ("1", "result code"),
     "cost": ("1", "published index"),
     "cost_finer": ("1", "published index of the finer re-run"),
     "evaluations": ("1", "objective evaluations"),
@@ -36,6 +37,11 @@ _UNITS = {
     ),
     "momentum_drift": ("1", "relative drift of the momentum in the finer re-run"),
 }
+# As the conventions for climate and forecast metadata (CF, 3.5) have flags.
+_CODES = {
+    "flag_values": np.array([MISSING, *map(int, ResultCode)]),
+    "flag_meanings": " ".join(["not_computed", *(code.name.lower() for code in ResultCode)]),
+}
 _COUNTS = ("code", "evaluations", "gradient_evaluations")
 _HISTORY = {
     "history_best_value": "best index so far",
@@ -48,6 +54,9 @@ _KEY_UNITS = {
     "task.angular_momentum": "N m s",
     "task.base_position": "m",
     "objective.tool_position.scale": "m",
+    "constraints.clearance.margin": "m",
+    "constraints.clearance.tolerance": "m",
+    "constraints.final_attitude.tolerance": "rad",
 }
 
 
@@ -76,7 +85,8 @@ def merged(
         for part in parts:
             if quantity in part.results:
                 values[list(part.numbers)] = part.results[quantity]
-        variables[quantity] = ("point", values, {"units": unit, "long_name": meaning})
+        attributes = {"units": unit, "long_name": meaning}
+        variables[quantity] = ("point", values, attributes | (_CODES if quantity == "code" else {}))
     variables |= merged_misses(count, ((part.numbers, part.results) for part in parts))
     variables["free_numbers"] = (
         ("point", "free"),

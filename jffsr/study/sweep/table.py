@@ -65,7 +65,7 @@ def markdown(dataset: Any, comparisons: Sequence[Comparison], most: int | None =
     for row in shown:
         cells = [_cell(value) for value in row.values.values()]
         met = np.count_nonzero(row.code == ResultCode.ACCURACY_MET)
-        quartiles = np.full(5, np.nan) if not row.cost.size else _quartiles(row.cost)
+        quartiles = np.full(5, np.nan) if not row.cost.size else [quantile(row.cost, k / 4) for k in range(5)]
         counts = [_median(row.evaluations), _median(row.gradient_evaluations)]
         lines.append(_line([*cells, str(row.points.size), str(met), *map(_number, quartiles), *counts]))
     if len(shown) < len(rows):
@@ -85,10 +85,12 @@ def markdown(dataset: Any, comparisons: Sequence[Comparison], most: int | None =
     return "\n".join(lines) + "\n"
 
 
-def _quartiles(cost: np.ndarray) -> np.ndarray:
-    # A run that found nothing finite has an infinite cost, next to which there is nothing to interpolate.
-    method = "linear" if np.all(np.isfinite(cost)) else "nearest"
-    return np.quantile(cost, [0, 0.25, 0.5, 0.75, 1], method=method)
+def quantile(values: np.ndarray, share: float) -> float:
+    """The quantile of values (k,), k >= 1, interpolated linearly; infinite beside a value that is."""
+    ordered = np.sort(values)
+    place = share * (len(ordered) - 1)
+    below, part = int(place), place - int(place)
+    return float(ordered[below] + (part * (ordered[below + 1] - ordered[below]) if part else 0.0))
 
 
 def _median(counts: np.ndarray) -> str:

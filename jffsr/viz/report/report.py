@@ -14,7 +14,7 @@ from jffsr.study.building import build_robot
 from jffsr.study.catalogue import robot_text
 from jffsr.study.kinds import summary_text
 from jffsr.study.run_folder import RunFolder
-from jffsr.study.summary import NOT_LOOKED_AT
+from jffsr.study.summary import NOT_LOOKED_AT, TORQUE_UNSEEN
 from jffsr.viz.replay.reading import replays_of
 from jffsr.viz.replay.replay import NothingMoved, Replay
 from jffsr.viz.report.page import page
@@ -56,7 +56,7 @@ def run_report(path: str | Path, figures: Sequence[Path]) -> str:
         f"<h1>{escape(name)}</h1>",
         f'<p class="kind">{kind}{_where(folder, name)}</p>',
         verdict(summary["result"]),
-        caution(summary.get("nearest_approach") == []),
+        caution(summary.get("nearest_approach") == [], summary.get("torque_limits_looked_at") is False),
         section("The motion", motion(lambda: replays_of(folder.path), name)),
         section("The task", _task(config, folder)),
         section("The result", _result(summary, config)),
@@ -79,9 +79,10 @@ def verdict(result: Mapping[str, Any]) -> str:
     return f'<p class="verdict {kind}">{escape(result["sentence"])}</p>'
 
 
-def caution(bodies_may_touch: bool) -> str:
-    """What a result does not say: whether bodies touch, where nobody asked for it."""
-    return f'<p class="verdict caution">{escape(NOT_LOOKED_AT.capitalize())}.</p>' if bodies_may_touch else ""
+def caution(bodies_may_touch: bool, torque_unseen: bool = False) -> str:
+    """What a result does not say: whether bodies touch, and torques keep their limits, where nobody asked for it."""
+    told = [text for text, so in ((NOT_LOOKED_AT, bodies_may_touch), (TORQUE_UNSEEN, torque_unseen)) if so]
+    return "".join(f'<p class="verdict caution">{escape(text[0].upper() + text[1:])}.</p>' for text in told)
 
 
 def section(title: str, content: str) -> str:

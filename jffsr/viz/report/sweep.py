@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from jffsr.errors import InputError
-from jffsr.study.building import build_robot
+from jffsr.planning.result import torque_unseen
+from jffsr.study.building import build_problem, build_robot
 from jffsr.study.dataset import open_dataset
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.sweep.ended import read_ended
@@ -50,12 +51,16 @@ def sweep_report(path: str | Path, figures: Sequence[Path]) -> str:
     robot = "" if "robot" in varied else f" &middot; robot {escape(own.stem)}"
     touched = first.trajectory.keeps_position and not is_varied("trajectory.kind", varied)
     by_law = ("position",) if touched else ()
+    torque = torque_unseen(build_problem(first)) and not any(
+        is_varied(key, varied)
+        for key in ("limits.torque", "objective.joint_torque", "constraints.torque_limit")
+    )
     whole = f"<details><summary>The whole configuration</summary><pre>{escape(text)}</pre></details>"
     parts = [
         f"<h1>{escape(name)}</h1>",
         f'<p class="kind">A sweep of plans{robot}</p>',
         verdict(summary["result"]),
-        caution(first.constraints.clearance is None and "constraints.clearance.margin" not in varied),
+        caution(first.constraints.clearance is None and "constraints.clearance.margin" not in varied, torque),
         best_setting(dataset),
         section("What was varied", varied_table(dataset)),
         section("What was fixed", fixed(first, varied, str(own)) + whole),

@@ -47,7 +47,8 @@ def best_setting(dataset: Dataset) -> str:
     return (
         f'<p class="verdict {"met" if best.met else "missed"}">Best setting: {escape(best.sentence)}.</p>'
         "<p>That is the setting most of whose runs met their accuracy, and among equals the one with the least "
-        f"median J. Of {best.settings} settings {best.whole} met it in every run.</p>"
+        f"median J, or the least J where medians are equal. Of {best.settings} settings {best.whole} met it in every "
+        "run.</p>"
     )
 
 
@@ -72,6 +73,11 @@ def binding_table(dataset: Dataset, kept_by_law: Collection[str] = ()) -> str:
         "<p>Of the best run of each setting, at the finer re-run. A setting whose accuracy is missed is held back by "
         "the term that costs most; a limit with nothing left is where its motion goes as far as it may.</p>"
     )
+    if limited and kept_by_law:
+        words += (
+            f"<p>Limits of {', '.join(kept_by_law)} are left out: the joint law goes as far as they allow, and never "
+            "beyond.</p>"
+        )
     if not limited:
         heads, rows = heads[:-1], [row[:-1] for row in rows]
     left = len(rows_of(dataset)) - len(rows)

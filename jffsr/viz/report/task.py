@@ -51,8 +51,8 @@ def joints_table(robot: Robot, task: Mapping[str, Any], varied: Collection[str] 
         if found is not None:
             columns.append((f"{end} [{length}]", found))
     for quantity, name, values, factor, unit in (
-        ("position", "from", limits.position_lower, degrees, length),
-        ("position", "to", limits.position_upper, degrees, length),
+        ("position", "lower limit", limits.position_lower, degrees, length),
+        ("position", "upper limit", limits.position_upper, degrees, length),
         ("rate", "rate limit", limits.velocity, degrees, f"{length}/s"),
         ("acceleration", "acceleration limit", limits.acceleration, degrees, f"{length}/s^2"),
         ("torque", "torque limit", limits.torque, np.ones(len(turning)), force),
