@@ -8,10 +8,14 @@ from textwrap import wrap
 
 import numpy as np
 
+from jffsr.clearance.model import ClearanceModel
+from jffsr.errors import InputError
 from jffsr.robots.builder import build_robot
 from jffsr.robots.geometry import COLLISION, VISUAL, Shape
 from jffsr.robots.loading import describe_robot, list_robots
 from jffsr.robots.robot import PRISMATIC, Robot
+
+_MOST_PAIRS = 15
 
 
 def catalogue_text(width: int | None = None) -> str:
@@ -66,7 +70,18 @@ def robot_text(name: str, width: int | None = None) -> str:
         "ranges, rates and accelerations in degrees (prismatic: m), torques in N m; inf: none given", width
     )
     lines.append(f"end effectors: {', '.join(robot.end_effector_names) or 'none'}")
+    lines += wrap(_kept_apart(robot), width, subsequent_indent="  ")
     return "\n".join(lines)
+
+
+def _kept_apart(robot: Robot) -> str:
+    """Which pairs of bodies a clearance looks at."""
+    try:
+        pairs = [" and ".join(pair) for pair in ClearanceModel.create(robot).pair_names]
+    except InputError:
+        return "pairs that constraints.clearance looks at: none"
+    more = f", and {len(pairs) - _MOST_PAIRS} more" if len(pairs) > _MOST_PAIRS else ""
+    return f"pairs that constraints.clearance looks at: {len(pairs)}: {', '.join(pairs[:_MOST_PAIRS])}{more}"
 
 
 def _kind(shape: Shape) -> str:

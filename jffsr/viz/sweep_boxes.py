@@ -54,10 +54,12 @@ def draw_boxes(dataset: Dataset) -> Figure | None:
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(place + 0.8, 0.2)
     axes.set_xscale("log")
+    # A box without width would end the axis.
+    axes.use_sticky_edges = False
+    axes.margins(x=0.05)
     if any(np.any(row.cost <= floor) for row in rows):
         axes.set_xlim(left=0.7 * floor)
     axes.set_xlabel("J [-]")
-    axes.margins(x=0.08)
     _mark_accuracy(axes, float(dataset.attrs["accuracy"]))
     handles = [
         Patch(facecolor=level_look(i)["color"], alpha=0.35) for i in range(len(levels) if coloured else 0)

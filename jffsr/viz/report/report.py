@@ -92,10 +92,12 @@ def section(title: str, content: str) -> str:
 
 def made(summary: Mapping[str, Any], command: str) -> str:
     """How to make it again, what it cost, and with which versions."""
-    rows = [("again", command)]
+    rows = [("again", f"{command}, which is the whole configuration above")]
     rows += [(name.replace("_", " "), summary[name]) for name in ("seed", "seeds") if name in summary]
     if "search_ended" in summary:
-        rows.append(("search ended", _ENDED.get(summary["search_ended"], summary["search_ended"])))
+        ended = _ENDED.get(summary["search_ended"], summary["search_ended"])
+        enough = "; J was small enough before" if summary.get("evaluations_to_accuracy") else ""
+        rows.append(("search ended", ended + enough))
     rows += [
         (f"{what}, {name}", value)
         for what in ("evaluations", "seconds")
