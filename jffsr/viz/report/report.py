@@ -94,8 +94,9 @@ def made(summary: Mapping[str, Any], command: str) -> str:
     """How to make it again, what it cost, and with which versions."""
     rows = [("again", f"{command}, which is the whole configuration above")]
     rows += [(name.replace("_", " "), summary[name]) for name in ("seed", "seeds") if name in summary]
-    if "search_ended" in summary:
-        ended = _ENDED.get(summary["search_ended"], summary["search_ended"])
+    # A path that is tracked without a search has none that ended.
+    if (reason := summary.get("search_ended")) is not None:
+        ended = _ENDED.get(reason, str(reason))
         enough = "; J was small enough before" if summary.get("evaluations_to_accuracy") else ""
         rows.append(("search ended", ended + enough))
     rows += [
