@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from jffsr.planning.problem import Problem
-from jffsr.planning.result import Tolerances, constraints_missed, violations
+from jffsr.planning.result import Tolerances, constraints_missed, limits_in_words, violations
 from jffsr.planning.verification import Verification
 
 
@@ -70,7 +70,8 @@ def explain_capture(
             f"found, but not verified on the finer grid: {', '.join(missed)}; raise num_steps or the margin"
         )
     else:
-        text = "captured: pose and velocity match, and every limit and constraint is kept on the finer grid"
+        limits = "every limit" if problem is None else limits_in_words(problem)
+        text = f"captured: pose and velocity match, and {limits}, and every constraint, is kept on the finer grid"
     return CaptureResult(code, text)
 
 

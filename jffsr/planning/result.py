@@ -109,7 +109,7 @@ def explain(
         index = f"J over {len(problem.uncertainty.robots.mass)} robots"
     broken = list(violations(problem, verification.overruns, tolerances))
     missed = ", ".join(constraints_missed(problem, verification, motion))
-    limits = "every limit but those of torque" if torque_unseen(problem) else "every limit"
+    limits = limits_in_words(problem)
     also = f"; limits violated: {', '.join(broken)}" if broken else f"; {limits} is kept"
     binding = _binding(verification)
     if code is ResultCode.ACCURACY_MET:
@@ -181,6 +181,11 @@ def constraints_missed(
             (missed, unit), (allowed, _) = (in_units(constraint, amount) for amount in (missed, allowed))
             unit = f" {unit}" if unit else ""
             yield f"{constraint.name} by {missed:.3g}{unit} (allowed {allowed:.3g}{unit}{where})"
+
+
+def limits_in_words(problem: Problem) -> str:
+    """What can be said to be kept where no limit is overrun."""
+    return "every limit but those of torque" if torque_unseen(problem) else "every limit"
 
 
 def torque_unseen(problem: Problem) -> bool:

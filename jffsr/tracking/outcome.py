@@ -162,7 +162,8 @@ def outcome(
             TrackingCode.LOST_PATH,
             f"the path was lost: the tool is off by up to {errors}, allowed are {_allowed(tolerances)}; {bound}",
         )
-    limits = ", and every limit as well" if np.isfinite(tolerances.limit) else "; limits were not looked at"
+    kept = ", and every limit of position, rate and acceleration as well"
+    limits = kept if np.isfinite(tolerances.limit) else "; limits were not looked at"
     return TrackingResult(TrackingCode.MET, f"the path is kept to {errors}{limits}")
 
 

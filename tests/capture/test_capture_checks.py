@@ -83,3 +83,8 @@ def test_each_code_has_its_sentence(code, said):
     result = explain_capture(code, attempts=7)
     assert said in result.sentence
     assert result.success == (code == CaptureCode.CAPTURED)
+    # Of a plan it is said which limits were looked at.
+    robot = SimpleNamespace(limits=SimpleNamespace(torque=np.array([20.0, np.inf])))
+    problem = SimpleNamespace(robot=robot, objective=SimpleNamespace(terms=()), constraints=())
+    kept = explain_capture(CaptureCode.CAPTURED, problem).sentence
+    assert "every limit but those of torque, and every constraint, is kept" in kept
