@@ -210,9 +210,11 @@ def _show(arguments: argparse.Namespace) -> int:
     if arguments.serve or (terminal and not arguments.no_serve):
         showing.serve_replays(folders, arguments.port, not arguments.no_browser)
     elif not written and not arguments.no_serve:
-        print(
-            "  replay        not opened, for there is no terminal; --serve opens it, --html and --report write pages"
-        )
+        if showing.can_serve():
+            told = "there is no terminal; --serve opens it, --html and --report write pages"
+        else:
+            told = "viser is not installed: pip install 'jffsr[show]'"
+        print(f"  replay        not opened, for {told}")
     return MET
 
 

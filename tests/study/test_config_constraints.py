@@ -10,6 +10,7 @@ from config_files import GOOD, folder, load  # noqa: F401 (the fixture acts by b
 
 from jffsr.errors import InputError
 from jffsr.objectives.constraints import BaseExcursion, FinalAttitude, JointLimits
+from jffsr.planning.result import torque_unseen
 from jffsr.study.building import build_problem
 from jffsr.study.config import dump_config
 from jffsr.study.schema import PlanningConfig
@@ -111,3 +112,21 @@ def test_sentence_of_a_mistake(added):
     with pytest.raises(InputError) as caught:
         load(GOOD + added)
     assert str(caught.value) == MISTAKES[added]
+
+
+@pytest.mark.parametrize(
+    ("asked", "unseen"),
+    [
+        ("", True),
+        ("objective: {joint_torque: {enabled: true}}\n", False),
+        ("constraints: {torque_limit: {}}\n", False),
+    ],
+)
+def test_torque_limits_of_the_robot_are_looked_at_where_it_is_asked(asked, unseen):
+    """As the summary advises: the servicer has limits of torque of its own."""
+    task = "task: {start_deg: [0, -60, 0, 45, 0, -15, 0], goal_deg: [20, -40, 10, 60, 0, -30, 10], duration: 30}\n"
+    problem = build_problem(
+        load(f"kind: planning\nrobot: servicer_7dof\n{task}limits: {{acceleration: 0.2}}\n{asked}")
+    )
+    assert torque_unseen(problem) == unseen
+    assert problem.needs_torque != unseen

@@ -16,6 +16,7 @@ from jffsr.study.dataset import save_dataset
 from jffsr.study.schema import PlanningConfig
 from jffsr.study.sweep.ended import failures_of, read_ended
 from jffsr.study.sweep.merging import FAILURE, MISSING
+from jffsr.viz import showing
 from jffsr.viz.report.sweep import fixed
 from jffsr.viz.report.sweep_findings import best_setting, binding_table, short_points, varied_table
 
@@ -182,15 +183,20 @@ def write_sweep(folder, dataset) -> None:
     (folder / "table.md").write_text("| a table |\n")
 
 
-def test_a_sweep_with_lost_points_can_be_shown(tmp_path, capsys):
+def test_a_sweep_with_lost_points_can_be_shown(tmp_path, capsys, monkeypatch):
     dataset = merged_sweep()
     dataset[FAILURE] = ("point", np.array(["", "", "", "", "MemoryError: no room", ""]))
     write_sweep(tmp_path / "s", dataset)
     summary = read_ended(tmp_path / "s")
     assert (summary["points"], summary["computed"], summary["met"]) == (6, 5, 3)
     assert summary["name"] == "durations"
-    assert cli.main(["show", str(tmp_path / "s"), "--no-serve"]) == cli.MET
+    monkeypatch.setattr(showing, "can_serve", lambda: True)
+    assert cli.main(["show", str(tmp_path / "s")]) == cli.MET
     said = capsys.readouterr().out
+    assert "replay        not opened, for there is no terminal; --serve opens it" in said
+    monkeypatch.setattr(showing, "can_serve", lambda: False)
+    assert cli.main(["show", str(tmp_path / "s")]) == cli.MET
+    assert "not opened, for viser is not installed" in capsys.readouterr().out
     assert "3 of 6 points met their accuracy; 1 could not be computed" in said
     assert "failed        point 4: MemoryError: no room" in said
     assert "best    task.duration = 40 s" in said
